@@ -1,0 +1,64 @@
+"""The few exceptions that Vermilion raises on purpose.
+
+Each message says where (subject, take, camera, frame, file), what was found, what was expected
+and what to do.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class VermilionError(Exception):
+    """Base of every error that a user can act upon."""
+
+
+def describe_problem(
+    found: str,
+    expected: str,
+    hint: str,
+    *,
+    subject: str | None = None,
+    take: str | None = None,
+    camera: str | None = None,
+    frame: int | None = None,
+    path: str | Path | None = None,
+) -> str:
+    """Compose the one-paragraph message that all errors share."""
+    place = [
+        f"{name} {value}"
+        for name, value in (
+            ("subject", subject),
+            ("take", take),
+            ("camera", camera),
+            ("frame", frame),
+            ("file", path),
+        )
+        if value is not None
+    ]
+    where = ", ".join(place)
+    prefix = f"{where}: " if where else ""
+    return f"{prefix}found {found}; expected {expected}. {hint}"
+
+
+class InputError(VermilionError):
+    """A file or value that the user gave cannot be used."""
+
+    def __init__(self, found: str, expected: str, hint: str, **place):
+        super().__init__(describe_problem(found, expected, hint, **place))
+
+
+class ConfigurationError(VermilionError):
+    """The configuration or the take sheet is wrong; lists every problem at once."""
+
+    def __init__(self, problems: list[str]):
+        self.problems = list(problems)
+        lines = "\n".join(f"  {i + 1}. {p}" for i, p in enumerate(self.problems))
+        super().__init__(f"{len(self.problems)} problem(s) in the configuration:\n{lines}")
+
+
+class ModelFileError(VermilionError):
+    """A model file is damaged, too new, or made for another topology."""
+
+    def __init__(self, found: str, expected: str, hint: str, **place):
+        super().__init__(describe_problem(found, expected, hint, **place))

@@ -1,0 +1,1 @@
+"""Face models behind one interface: `procedural` (embedded) and `ict` (ICT-FaceKit)."""
