@@ -1,0 +1,1 @@
+"""The configuration: one typed section a stage, unknown keys refused."""

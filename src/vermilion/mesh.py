@@ -1,0 +1,132 @@
+"""Triangle meshes: the noun, its normals, areas and adjacency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle mesh.
+
+    Attributes:
+        vertices_mm: (V, 3) float.
+        triangles: (T, 3) int, counter-clockwise seen from outside.
+    """
+
+    vertices_mm: np.ndarray
+    triangles: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.vertices_mm.ndim != 2 or self.vertices_mm.shape[1] != 3:
+            raise ValueError(f"vertices_mm must be (V, 3), got {self.vertices_mm.shape}")
+        if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
+            raise ValueError(f"triangles must be (T, 3), got {self.triangles.shape}")
+
+    def with_vertices(self, vertices_mm: np.ndarray) -> Mesh:
+        """The same topology at other positions, (V, 3)."""
+        return Mesh(vertices_mm, self.triangles)
+
+
+def triangle_cross(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Normal of each triangle times twice its area, (..., T, 3); `vertices` is (..., V, 3)."""
+    a, b, c = (vertices[..., triangles[:, k], :] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def triangle_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals, (..., T, 3); zero for a triangle without area."""
+    return normalised(triangle_cross(vertices, triangles))
+
+
+def triangle_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Areas, (..., T), in the square of the vertices' unit."""
+    return 0.5 * np.linalg.norm(triangle_cross(vertices, triangles), axis=-1)
+
+
+def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """A third of the area of the triangles round each vertex, (V,)."""
+    areas = triangle_areas(vertices, triangles)
+    weights = np.repeat(areas / 3.0, 3)
+    return np.bincount(triangles.reshape(-1), weights=weights, minlength=len(vertices))
+
+
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area-weighted unit normals of the vertices, (V, 3)."""
+    cross = triangle_cross(vertices, triangles)
+    return normalised(incidence(triangles, len(vertices)) @ cross)
+
+
+def incidence(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
+    """(V, T) matrix with 1 where a triangle has a vertex."""
+    n_triangles = len(triangles)
+    columns = np.repeat(np.arange(n_triangles), 3)
+    data = np.ones(3 * n_triangles)
+    shape = (n_vertices, n_triangles)
+    return sparse.csr_matrix((data, (triangles.reshape(-1), columns)), shape=shape)
+
+
+def unique_edges(triangles: np.ndarray) -> np.ndarray:
+    """Undirected edges, (E, 2), lower vertex first, sorted."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    return np.unique(np.sort(edges, axis=1), axis=0)
+
+
+def boundary_edges(triangles: np.ndarray) -> np.ndarray:
+    """Directed edges that only one triangle has, (B, 2)."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    _, inverse, counts = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return edges[counts[inverse.reshape(-1)] == 1]
+
+
+def adjacency(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
+    """(V, V) symmetric matrix with 1 between neighbours."""
+    edges = unique_edges(triangles)
+    rows = np.concatenate([edges[:, 0], edges[:, 1]])
+    columns = np.concatenate([edges[:, 1], edges[:, 0]])
+    return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n_vertices,) * 2)
+
+
+def submesh(triangles: np.ndarray, keep_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Crop to the vertices of a mask.
+
+    Args:
+        triangles: (T, 3).
+        keep_vertices: (V,) bool.
+
+    Returns:
+        (vertex ids kept (V',), triangles (T', 3) in the new numbering).
+    """
+    kept = triangles[keep_vertices[triangles].all(axis=1)]
+    ids = np.unique(kept)
+    renumber = np.full(len(keep_vertices), -1, dtype=np.int64)
+    renumber[ids] = np.arange(len(ids))
+    return ids, renumber[kept].astype(np.int32)
+
+
+def normalised(vectors: np.ndarray) -> np.ndarray:
+    """Unit vectors along the last axis; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=float), where=length > 0)
+
+
+def rigid_alignment(
+    source: np.ndarray, target: np.ndarray, weights: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and translation (3,) that bring `source` (N, 3) onto `target` (N, 3).
+
+    Weighted least squares (Arun et al. 1987): target ~ source @ rotation.T + translation.
+    """
+    weights = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=float)
+    weights = weights / weights.sum()
+    source_mean, target_mean = weights @ source, weights @ target
+    covariance = ((source - source_mean) * weights[:, None]).T @ (target - target_mean)
+    u, _, vt = np.linalg.svd(covariance)
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
+    rotation = vt.T @ flip @ u.T
+    return rotation, target_mean - rotation @ source_mean
