@@ -1,0 +1,86 @@
+"""Lip contours as closed vertex loops, and what they bound: geodesic regions of a face mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from vermilion.mesh import unique_edges
+
+#: Points of the 66-point scheme (DESIGN) round the mouth, each loop in order from the subject's
+#: right corner over the upper lip to the left corner and back under the lower lip.
+OUTER_LOOP = (58, 48, 49, 50, 51, 52, 62, 53, 54, 55, 56, 57)
+INNER_LOOP = (58, 59, 60, 61, 62, 63, 64, 65)
+RIGHT_CORNER, LEFT_CORNER = 58, 62
+
+
+def edge_graph(
+    vertices_mm: np.ndarray, triangles: np.ndarray, cost: np.ndarray | None = None
+) -> sparse.csr_matrix:
+    """(V, V) symmetric graph of edge lengths in mm; `cost` (V,) multiplies by its mean."""
+    edges = unique_edges(triangles)
+    length = np.linalg.norm(vertices_mm[edges[:, 0]] - vertices_mm[edges[:, 1]], axis=1)
+    length = np.maximum(length, 1e-6)
+    if cost is not None:
+        length = length * 0.5 * (cost[edges[:, 0]] + cost[edges[:, 1]])
+    n_vertices = len(vertices_mm)
+    graph = sparse.coo_matrix((length, (edges[:, 0], edges[:, 1])), shape=(n_vertices,) * 2)
+    return (graph + graph.T).tocsr()
+
+
+def closed_loop(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
+    """Closed vertex loop (n,) through the waypoints in order, by shortest paths along edges."""
+    waypoints = np.asarray(waypoints)
+    _, previous = csgraph.dijkstra(graph, indices=waypoints, return_predecessors=True)
+    loop: list[int] = []
+    for index, start in enumerate(waypoints):
+        end = waypoints[(index + 1) % len(waypoints)]
+        path = [end]
+        while path[-1] != start:
+            step = previous[index, path[-1]]
+            if step < 0:
+                raise ValueError(f"no path along the edges from vertex {start} to vertex {end}")
+            path.append(step)
+        loop += path[:0:-1]
+    return np.array(loop, dtype=np.int32)
+
+
+def geodesic_distance(graph: sparse.spmatrix, sources: np.ndarray) -> np.ndarray:
+    """Distance along edges of every vertex to the nearest source, (V,) mm; inf where apart."""
+    return csgraph.dijkstra(graph, indices=np.unique(sources), min_only=True)
+
+
+def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int) -> np.ndarray:
+    """Vertices on the same side of a closed loop as `seed`, (V,) bool, the loop not counted."""
+    edges = unique_edges(triangles)
+    on_loop = np.zeros(n_vertices, dtype=bool)
+    on_loop[loop] = True
+    edges = edges[~on_loop[edges].any(axis=1)]
+    graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n_vertices,) * 2)
+    _, label = csgraph.connected_components(graph, directed=False)
+    return (label == label[seed]) & ~on_loop
+
+
+def lip_sides(
+    graph: sparse.spmatrix, outer: np.ndarray, inner: np.ndarray, corners: tuple[int, int]
+) -> np.ndarray:
+    """Which vertices belong to the upper lip's side (True) and which to the lower's, (V,) bool.
+
+    Both loops start at the subject's right corner and run over the upper lip; `corners` are the
+    right and left corner of `outer`. A vertex belongs to the side whose contour is nearer.
+    """
+    upper, lower = [], []
+    for loop in (outer, inner):
+        turn = _turning_point(graph, loop, corners[1])
+        upper.append(loop[1:turn])
+        lower.append(loop[turn + 1 :])
+    to_upper = geodesic_distance(graph, np.concatenate(upper))
+    to_lower = geodesic_distance(graph, np.concatenate(lower))
+    return to_upper <= to_lower
+
+
+def _turning_point(graph: sparse.spmatrix, loop: np.ndarray, corner: int) -> int:
+    """Index in the loop of the vertex nearest to the left corner."""
+    distance = csgraph.dijkstra(graph, indices=corner)
+    return int(np.argmin(distance[loop]))
