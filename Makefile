@@ -1,0 +1,65 @@
+# Each target sets up what it needs: a virtual environment with the locked versions.
+PYTHON ?= python3
+CONFIG ?= config/config.yaml
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+RESULTS = $$($(BIN)/python -c 'import sys, yaml; print(yaml.safe_load(open(sys.argv[1])).get("results", "results/demo"))' $(CONFIG))
+
+.PHONY: help setup demo run report verify test test-quick lint format docs clean
+
+help:
+	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
+	@echo "make run         the same for CONFIG=config/YOURS.yaml"
+	@echo "make verify      find and remove damaged results of CONFIG"
+	@echo "make test        all tests; make test-quick: those that take seconds"
+	@echo "make lint        style of Python and Snakemake files"
+	@echo "make docs        regenerate the configuration reference and schemas"
+	@echo "make clean       remove the environment and caches (results stay)"
+
+setup: $(READY)
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit("Vermilion needs Python 3.11 or newer, found " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV) || { echo "Install the venv module: apt-get install python3-venv"; exit 1; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@
+
+demo: CONFIG = config/config.yaml
+demo: run
+
+run: $(READY)
+	$(BIN)/snakemake --configfile $(CONFIG)
+	@$(MAKE) --no-print-directory report CONFIG=$(CONFIG)
+
+report: $(READY)
+	@$(BIN)/snakemake --configfile $(CONFIG) --report "$(RESULTS)/report.html" >/dev/null 2>"$(RESULTS)/logs/report.log" || { cat "$(RESULTS)/logs/report.log"; exit 1; }
+	@$(BIN)/python -m vermilion.workflow.results "$(RESULTS)"
+
+verify: $(READY)
+	@$(BIN)/python -m vermilion.workflow.checksums "$(RESULTS)"
+
+test: $(READY)
+	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -m slow
+
+test-quick: $(READY)
+	$(BIN)/python -m pytest -m "not slow"
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/snakefmt Snakefile workflow
+
+docs: $(READY)
+	$(BIN)/python -m vermilion.config.reference
+
+clean:
+	rm -rf $(VENV) .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

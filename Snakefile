@@ -1,0 +1,59 @@
+"""Vermilion: rebuild a lip-shape database from captures, train lip correction, measure and apply it.
+
+Configuration, includes, targets: nothing else. The stages are in `workflow/rules/`, in the order of
+the papers. Lips16, Guided18 and Mono13 are named in docs/papers.md.
+"""
+
+if not workflow.configfiles:
+
+    configfile: "config/config.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/face.smk"
+include: "workflow/rules/studio.smk"
+include: "workflow/rules/capture.smk"
+include: "workflow/rules/landmarks.smk"
+include: "workflow/rules/multiview.smk"
+include: "workflow/rules/inpaint.smk"
+include: "workflow/rules/tracking.smk"
+include: "workflow/rules/contours.smk"
+include: "workflow/rules/correspondence.smk"
+include: "workflow/rules/features.smk"
+include: "workflow/rules/correction.smk"
+include: "workflow/rules/database.smk"
+include: "workflow/rules/training.smk"
+include: "workflow/rules/evaluation.smk"
+include: "workflow/rules/apply.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    """Everything: database, regressors, measures, corrected videos, the summary."""
+    default_target: True
+    input:
+        R + "/database/lips.h5",
+        R + "/evaluation/measures.tsv",
+        R + "/evaluation/summary.html",
+        R + "/quality.tsv",
+        apply_outputs(),
+
+
+rule database_only:
+    """The training database of all subjects (Lips16 section 3)."""
+    input:
+        R + "/database/lips.h5",
+
+
+rule regressors:
+    """Every regressor of Lips16 section 6: PS, MS, GR."""
+    input:
+        regressor_outputs(),
+
+
+onsuccess:
+    record_checksums()
+
+
+onerror:
+    record_checksums()

@@ -1,0 +1,131 @@
+"""Check the whole configuration at once, before any job runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from vermilion.config.root import Configuration
+from vermilion.config.takes import STUDIO, Take, read_takes
+from vermilion.errors import ConfigurationError, VermilionError
+from vermilion.frames import list_frames
+from vermilion.video import VIDEO_SUFFIXES, VideoReader
+
+
+def load_configuration(
+    raw: dict[str, Any], origin: str, check_disk: bool = True
+) -> tuple[Configuration, list[Take]]:
+    """Validate the merged configuration and its take sheet.
+
+    Args:
+        raw: the configuration as read from YAML and the command line.
+        origin: file name(s) for the messages.
+        check_disk: also check that sources and frame ranges exist (the main process does).
+
+    Raises:
+        ConfigurationError: listing every problem of both files.
+    """
+    problems: list[str] = []
+    configuration = None
+    try:
+        configuration = Configuration(**raw)
+    except ValidationError as error:
+        problems += [_sentence(origin, item) for item in error.errors()]
+    sheet = raw.get("takes", Configuration.model_fields["takes"].default)
+    takes, wrong = read_takes(str(sheet))
+    problems += wrong
+    if configuration is not None:
+        problems += _cross_checks(configuration, takes, origin)
+    if check_disk:
+        for take in takes:
+            problems += [f"{sheet}, take {take.name}: {p}" for p in check_source(take)]
+    if problems:
+        raise ConfigurationError(problems)
+    assert configuration is not None
+    return configuration, takes
+
+
+def check_source(take: Take) -> list[str]:
+    """What is wrong with the source of a take on disk."""
+    if take.source == STUDIO or take.role == "tracked":
+        return []
+    source = Path(take.source)
+    wanted = f"frames {take.first} to {take.last}"
+    if not source.exists():
+        return [
+            f"source: found no '{source}'; expected a capture folder, a frame folder or a "
+            "video. Correct the path (relative to the folder where the workflow starts)."
+        ]
+    if source.is_file():
+        if source.suffix.lower() not in VIDEO_SUFFIXES:
+            return [f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES)}."]
+        try:
+            count = VideoReader(source).n_frames
+        except VermilionError as error:
+            return [str(error)]
+        if take.last >= count:
+            return [
+                f"source: found {count} frames in '{source}'; expected {wanted} (counted from "
+                f"0). Set `last` to at most {count - 1}."
+            ]
+        return []
+    folders = sorted(p for p in (source / "frames").glob("*") if p.is_dir()) or [source]
+    problems = []
+    for folder in folders:
+        present = list_frames(folder)
+        missing = [f for f in take.frames if f not in present]
+        # A camera may miss frames (they are flagged later); a take may not lie outside the disk.
+        if len(missing) == len(take.frames) or take.last > max(present, default=-1):
+            span = f"{min(present)} to {max(present)}" if present else "none"
+            problems.append(
+                f"source: found frames {span} in '{folder}'; expected {wanted}. Correct "
+                "`first` and `last`, or export the frames."
+            )
+    return problems
+
+
+def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) -> list[str]:
+    problems = []
+    subjects = {take.subject for take in takes}
+    by_name = {take.name: take for take in takes}
+    studio = configuration.studio.subjects
+    for take in takes:
+        if take.source == STUDIO and take.subject not in studio:
+            problems.append(
+                f"{origin}, key studio.subjects: found {sorted(studio)}; expected "
+                f"also '{take.subject}', as take {take.name} has the source `studio`."
+            )
+    for name in studio:
+        if name not in subjects:
+            problems.append(
+                f"{origin}, key studio.subjects.{name}: found a subject without takes; "
+                "expected a row of the take sheet. Add one or remove the subject."
+            )
+    for name in configuration.apply.takes:
+        if name not in by_name:
+            problems.append(
+                f"{origin}, key apply.takes: found '{name}'; expected a take of the "
+                f"sheet, written subject/take: {', '.join(by_name) or 'none there'}."
+            )
+    for name in configuration.landmarks.training_takes:
+        if name not in by_name:
+            problems.append(
+                f"{origin}, key landmarks.training_takes: found '{name}'; expected a "
+                f"take of the sheet, written subject/take."
+            )
+    return problems
+
+
+def _sentence(origin: str, item: dict[str, Any]) -> str:
+    key = ".".join(str(part) for part in item["loc"]) or "(top level)"
+    found = item.get("input")
+    if item["type"] == "extra_forbidden":
+        return (
+            f"{origin}, key {key}: found an unknown key; expected one of the reference in "
+            "docs/configuration.md. Correct the spelling or remove it."
+        )
+    if item["type"] == "missing":
+        return f"{origin}, key {key}: found nothing; expected a value. Add the key."
+    return f"{origin}, key {key}: found {found!r}; expected: {item['msg']}."

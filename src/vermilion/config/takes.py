@@ -1,0 +1,168 @@
+"""The take sheet: one row a take, every row checked."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+Role = Literal["tattoo", "plain", "video", "tracked"]
+COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
+#: `source` of a take that the studio makes.
+STUDIO = "studio"
+
+
+@dataclass(frozen=True)
+class Take:
+    """A row of the take sheet.
+
+    Attributes:
+        subject, take: names, letters, digits, `_` and `.` only.
+        role: `tattoo`, `plain`, `video` or `tracked`.
+        source: capture folder, frame folder or video file; `studio` for the embedded default.
+        first, last: frame numbers, both included. The first is the neutral.
+        fps: frames a second.
+        split: `train`, `test`, `test:A-B` (frames A to B are held out, the rest trains), or `none`.
+    """
+
+    subject: str
+    take: str
+    role: Role
+    source: str
+    first: int
+    last: int
+    fps: float
+    split: str
+
+    @property
+    def name(self) -> str:
+        return f"{self.subject}/{self.take}"
+
+    @property
+    def frames(self) -> range:
+        return range(self.first, self.last + 1)
+
+    @property
+    def is_multiview(self) -> bool:
+        return self.role in ("tattoo", "plain")
+
+    def held_out(self, frame: int) -> bool:
+        """Whether no regressor may train on this frame."""
+        if self.split.startswith("test:"):
+            low, high = (int(n) for n in self.split[5:].split("-"))
+            return low <= frame <= high
+        return self.split != "train"
+
+    def test_frames(self) -> list[int]:
+        """Frames that evaluation measures: held out of training, and meant as a test."""
+        return [] if self.split == "none" else [f for f in self.frames if self.held_out(f)]
+
+    def train_frames(self) -> list[int]:
+        return [f for f in self.frames if not self.held_out(f)]
+
+
+def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
+    """Read the sheet; returns the good rows and a sentence for each problem (none raised)."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        return [], [
+            f"{path}: found no readable take sheet ({error.strerror}); expected a TSV with "
+            f"columns {' '.join(COLUMNS)}. Create it or correct the key `takes`."
+        ]
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = list(csv.DictReader(lines, delimiter="\t"))
+    header = lines[0].split("\t") if lines else []
+    missing = [name for name in COLUMNS if name not in header]
+    unknown = [name for name in header if name not in COLUMNS]
+    if missing or unknown:
+        return [], [
+            f"{path}, header: found columns {header}; expected {list(COLUMNS)}, separated "
+            "by tabs. Correct the first line."
+        ]
+    takes, problems = [], []
+    for number, row in enumerate(rows, start=1):
+        take, wrong = _parse(row)
+        problems += [f"{path}, row {number} ({row['subject']}/{row['take']}): {w}" for w in wrong]
+        if take is not None:
+            takes.append(take)
+    problems += [f"{path}: {problem}" for problem in _check_together(takes)]
+    return takes, problems
+
+
+def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
+    value = {name: (row[name] or "").strip() for name in COLUMNS}
+    wrong = []
+    for name in ("subject", "take"):
+        if not re.fullmatch(r"[A-Za-z0-9_.]+", value[name]):
+            wrong.append(
+                f"{name}: found '{value[name]}'; expected letters, digits, '_' and '.'. "
+                "Rename it: it becomes a folder."
+            )
+    if value["role"] not in get_args(Role):
+        wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
+    if not value["source"]:
+        wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
+    numbers = {}
+    for name, kind in (("first", int), ("last", int), ("fps", float)):
+        try:
+            numbers[name] = kind(value[name])
+        except ValueError:
+            wrong.append(
+                f"{name}: found '{value[name]}'; expected "
+                f"{'a whole number' if kind is int else 'a number'}."
+            )
+    if {"first", "last"} <= numbers.keys() and not 0 <= numbers["first"] <= numbers["last"]:
+        wrong.append(
+            f"frames: found {numbers['first']} to {numbers['last']}; expected 0 <= first <= last."
+        )
+    if numbers.get("fps", 1) <= 0:
+        wrong.append(f"fps: found {numbers['fps']}; expected more than 0 frames a second.")
+    split = value["split"] or "none"
+    if not re.fullmatch(r"train|test|none|test:\d+-\d+", split):
+        wrong.append(
+            f"split: found '{split}'; expected train, test, none or test:A-B "
+            "(frames A to B held out)."
+        )
+    elif split.startswith("test:") and {"first", "last"} <= numbers.keys():
+        low, high = (int(n) for n in split[5:].split("-"))
+        if not numbers["first"] <= low <= high <= numbers["last"]:
+            wrong.append(
+                f"split: found held-out frames {low} to {high}; expected them within "
+                f"{numbers['first']} to {numbers['last']}."
+            )
+    if wrong:
+        return None, wrong
+    return Take(
+        value["subject"],
+        value["take"],
+        value["role"],
+        value["source"],  # type: ignore
+        split=split,
+        **numbers,
+    ), []
+
+
+def _check_together(takes: list[Take]) -> list[str]:
+    problems = []
+    names = [take.name for take in takes]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        problems.append(
+            f"take {name}: found {names.count(name)} rows; expected one. Rename a take."
+        )
+    for take in takes:
+        if take.role == "plain" and len(take.frames) != 1:
+            problems.append(
+                f"take {take.name}: found {len(take.frames)} frames; expected one frame "
+                "without tattoo in a `plain` take. Set `last` to `first`."
+            )
+        plain = [t for t in takes if t.subject == take.subject and t.role == "plain"]
+        if take.role == "tattoo" and len(plain) != 1:
+            problems.append(
+                f"take {take.name}: found {len(plain)} `plain` takes of subject "
+                f"{take.subject}; expected one. Add a row for the frame without tattoo."
+            )
+    return problems

@@ -1,0 +1,142 @@
+"""Recorded checksums of every result, to find files that were damaged after their job ended.
+
+Snakemake trusts what lies under a final name. The ledger `checksums.tsv` in the results folder is
+written when a run ends; `verify` compares, names the damaged files and removes them, so that the
+next run makes exactly these again.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from vermilion.files import sha256_of
+from vermilion.tables import read_table, write_table
+
+LEDGER = "checksums.tsv"
+#: Folders of a results folder whose files are no results.
+LEFT_OUT = ("logs", "benchmarks")
+#: Two clocks and a file system's rounding lie between a file's time and its job's recorded end.
+CLOCK_SLACK_S = 0.05
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A result that is not what its job wrote, with the reason."""
+
+    path: Path
+    reason: str
+
+
+def record(
+    results: Path, outputs: list[Path], finished_at: Callable[[Path], float | None]
+) -> list[Damage]:
+    """Bring the ledger up to date after a run; returns what must not be trusted.
+
+    A file that is new or changed is recorded only where it is no younger than the recorded end of
+    the job that wrote it; a younger one was changed by somebody else and keeps its old entry.
+
+    Args:
+        results: the results folder.
+        outputs: declared outputs, files or folders.
+        finished_at: recorded end of the job that wrote an output, seconds since the epoch, or None
+            where no finished job is known.
+    """
+    known = _read(results)
+    entries, refused = {}, []
+    for output in outputs:
+        end = finished_at(output)
+        for path in _files_of(output):
+            name = path.relative_to(results).as_posix()
+            state = path.stat()
+            entry = known.get(name)
+            if entry and entry["bytes"] == state.st_size and entry["mtime_ns"] == state.st_mtime_ns:
+                entries[name] = entry
+            elif end is not None and state.st_mtime <= end + CLOCK_SLACK_S:
+                entries[name] = {
+                    "bytes": state.st_size,
+                    "mtime_ns": state.st_mtime_ns,
+                    "sha256": sha256_of(path),
+                    "output": output.relative_to(results).as_posix(),
+                }
+            else:
+                refused.append(Damage(path, "changed after its job had ended"))
+                if entry:
+                    entries[name] = entry
+    rows = [{"path": name, **entries[name]} for name in sorted(entries)]
+    columns = ["path", "bytes", "mtime_ns", "sha256", "output"]
+    write_table(results / LEDGER, pd.DataFrame(rows, columns=columns))
+    return refused
+
+
+def find_damage(results: Path) -> list[Damage]:
+    """Results whose content differs from the ledger, or that are gone from within a folder."""
+    damage = []
+    for name, entry in _read(results).items():
+        path, output = results / name, results / entry["output"]
+        if not output.exists():
+            continue  # removed as a whole: Snakemake sees that by itself
+        if not path.is_file():
+            damage.append(Damage(path, "missing"))
+        elif path.stat().st_size != entry["bytes"]:
+            damage.append(Damage(path, f"{path.stat().st_size} bytes, not {entry['bytes']}"))
+        elif sha256_of(path) != entry["sha256"]:
+            damage.append(Damage(path, "content differs from its recorded checksum"))
+    return damage
+
+
+def remove_damaged(results: Path, damage: list[Damage]) -> list[Path]:
+    """Remove the outputs that hold damaged files; returns what was removed."""
+    outputs = {
+        results / _read(results)[d.path.relative_to(results).as_posix()]["output"] for d in damage
+    }
+    for output in sorted(outputs):
+        if output.is_dir():
+            shutil.rmtree(output)
+        else:
+            output.unlink(missing_ok=True)
+    return sorted(outputs)
+
+
+def _read(results: Path) -> dict[str, dict]:
+    path = results / LEDGER
+    if not path.is_file():
+        return {}
+    table = read_table(path, ("path", "bytes", "mtime_ns", "sha256", "output"))
+    return {row.pop("path"): row for row in table.to_dict("records")}
+
+
+def _files_of(output: Path) -> Iterator[Path]:
+    if output.is_file():
+        yield output
+    elif output.is_dir():
+        yield from sorted(
+            p for p in output.rglob("*") if p.is_file() and p.name != ".snakemake_timestamp"
+        )
+
+
+def main(arguments: list[str]) -> int:
+    """`python -m vermilion.workflow.checksums RESULTS`: name and remove damaged files."""
+    results = Path(arguments[0])
+    if not (results / LEDGER).is_file():
+        print(f"{results / LEDGER}: no checksums recorded yet; run the workflow first")
+        return 1
+    damage = find_damage(results)
+    for item in damage:
+        print(f"damaged: {item.path} ({item.reason})")
+    for output in remove_damaged(results, damage):
+        print(f"removed: {output}")
+    print(
+        f"{len(damage)} damaged file(s) in {results}"
+        + ("; run the workflow again to repair them" if damage else "")
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
