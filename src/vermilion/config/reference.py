@@ -1,0 +1,125 @@
+"""Generate what documents the configuration: JSON schemas and the reference page.
+
+`python -m vermilion.config.reference` writes them; a test prints the difference where they drift.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from vermilion.config.root import Configuration
+from vermilion.config.takes import COLUMNS
+from vermilion.files import atomic_path
+
+ROLES = ("tattoo", "plain", "video", "tracked")
+
+
+def generated_files() -> dict[str, str]:
+    """Path relative to the project -> text, of every generated file."""
+    return {
+        "workflow/schemas/config.schema.json": _json(Configuration.model_json_schema()),
+        "workflow/schemas/takes.schema.json": _json(take_sheet_schema()),
+        "docs/configuration.md": reference_page(),
+    }
+
+
+def take_sheet_schema() -> dict[str, Any]:
+    """JSON schema of one row of the take sheet."""
+    name = {"type": "string", "pattern": "^[A-Za-z0-9_.]+$"}
+    whole = {"type": "integer", "minimum": 0}
+    properties = {
+        "subject": {**name, "description": "Name of the person."},
+        "take": {**name, "description": "Name of the take; unique for the subject."},
+        "role": {"enum": list(ROLES), "description": "What the take is for."},
+        "source": {
+            "type": "string",
+            "description": "Capture folder, frame folder or video; `studio` for a synthetic one.",
+        },
+        "first": {**whole, "description": "First frame: the neutral, mouth slightly open."},
+        "last": {**whole, "description": "Last frame, included."},
+        "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Frames a second."},
+        "split": {
+            "type": "string",
+            "pattern": r"^(train|test|none|test:\d+-\d+)$",
+            "description": "train, test, none, or test:A-B (frames A to B are held out).",
+        },
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A row of the take sheet",
+        "type": "object",
+        "properties": properties,
+        "required": list(COLUMNS),
+        "additionalProperties": False,
+    }
+
+
+def reference_page() -> str:
+    """The reference of all keys, in Markdown."""
+    lines = [
+        "# Configuration reference",
+        "",
+        "Generated from the code by `make docs`. Unknown keys are errors; every problem of the",
+        "configuration and of the take sheet is reported at once, before any job runs.",
+        "",
+    ]
+    lines += _section(Configuration, "")
+    lines += ["## The take sheet", "", "| column | meaning |", "|---|---|"]
+    for name, entry in take_sheet_schema()["properties"].items():
+        lines.append(f"| `{name}` | {entry['description']} |")
+    return "\n".join(lines) + "\n"
+
+
+def _section(model: type[BaseModel], prefix: str) -> list[str]:
+    rows, nested = [], []
+    for name, field in model.model_fields.items():
+        key = f"{prefix}{name}"
+        description = (field.description or "").replace("|", "\\|").replace("\n", " ")
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            nested += [f"## `{key}`", "", description, "", *_section(inner, f"{key}.")]
+            continue
+        default = field.get_default(call_default_factory=True)
+        shown = json.dumps(_plain(default)) if not field.is_required() else "(needed)"
+        limits = ", ".join(_limit(m) for m in field.metadata if _limit(m))
+        rows.append(f"| `{key}` | `{shown}` | {limits} | {description} |")
+    table = ["| key | default | range | meaning |", "|---|---|---|---|", *rows, ""] if rows else []
+    return table + nested
+
+
+def _limit(constraint: Any) -> str:
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<", "min_length": "length >="}
+    return ", ".join(
+        f"{sign} {getattr(constraint, name)}"
+        for name, sign in signs.items()
+        if getattr(constraint, name, None) is not None
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json")
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _json(schema: dict[str, Any]) -> str:
+    return json.dumps(schema, indent=2) + "\n"
+
+
+def write_all(root: Path) -> None:
+    """Write every generated file below the project's root."""
+    for name, text in generated_files().items():
+        with atomic_path(root / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_all(Path(__file__).resolve().parents[3])
