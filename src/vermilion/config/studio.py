@@ -1,0 +1,133 @@
+"""Configuration of the studio: synthetic captures that stand in for a real rig."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from vermilion.config.base import StageConfig
+
+
+class StudioTake(StageConfig):
+    """How one take of the studio is performed and lit. Its role comes from the take sheet."""
+
+    performance: Literal["generated", "live_link", "people"] = Field(
+        "generated",
+        description="`generated`: curves made from the seed. `live_link`: a Live Link Face CSV. "
+        "`people`: every frame another random person, expression and light, with landmark labels "
+        "(to train the embedded landmark regressor).",
+    )
+    seed: int = Field(0, ge=0, description="Seed of the curves and of the head motion.")
+    csv: str | None = Field(
+        None, description="`live_link` only: the CSV file with ARKit weights, one row a frame."
+    )
+    csv_first: int = Field(0, ge=0, description="`live_link` only: first row used (frame number).")
+    csv_fps: float = Field(
+        30.0, gt=0, description="`live_link` only: rate of the rows (frames a second)."
+    )
+    lights: Literal["rig", "room", "window"] = Field(
+        "rig",
+        description="`rig`: even light of a capture rig. `room`: lamps above and at one side. "
+        "`window`: strong light from one side.",
+    )
+
+    @model_validator(mode="after")
+    def _live_link_needs_csv(self) -> StudioTake:
+        if self.performance == "live_link" and not self.csv:
+            raise ValueError("performance is 'live_link' but csv is empty; name the CSV file")
+        return self
+
+
+class StudioSubject(StageConfig):
+    """A synthetic actor."""
+
+    seed: int = Field(0, ge=0, description="Seed of the actor's shape and skin.")
+    identity: list[float] | None = Field(
+        None,
+        description="Identity coefficients (standard deviations); empty: drawn from the seed.",
+    )
+    takes: dict[str, StudioTake] = Field(
+        default_factory=dict,
+        description="How each take is performed, by take name; takes not named have the defaults.",
+    )
+
+
+class StudioConfig(StageConfig):
+    """Actors, their performances, the cameras and the light."""
+
+    subjects: dict[str, StudioSubject] = Field(
+        default_factory=dict, description="The synthetic actors, by subject name."
+    )
+    identity_spread: float = Field(
+        0.7,
+        ge=0,
+        le=2,
+        description="Deviation of drawn identity coefficients (standard deviations).",
+    )
+    face_size_px: tuple[int, int] = Field(
+        (512, 512), description="Width and height of the six face cameras' pictures (px)."
+    )
+    lip_size_px: tuple[int, int] = Field(
+        (512, 512), description="Width and height of the four lip cameras' pictures (px)."
+    )
+    video_size_px: tuple[int, int] = Field(
+        (640, 480), description="Width and height of `video` takes' pictures (px)."
+    )
+    face_view_mm: float = Field(
+        245.0, gt=50, le=1000, description="Height that a face camera sees at the face (mm)."
+    )
+    lip_view_mm: float = Field(
+        105.0, gt=30, le=500, description="Height that a lip camera sees at the lips (mm)."
+    )
+    video_view_mm: float = Field(
+        250.0, gt=50, le=1000, description="Height that a video camera sees at the face (mm)."
+    )
+    camera_distance_mm: float = Field(
+        735.0, gt=200, le=5000, description="Distance of the cameras from the face (mm)."
+    )
+    slight_open: float = Field(
+        0.08,
+        ge=0,
+        le=0.3,
+        description="Weight of jawOpen in the first frame of every take, so that the lips part "
+        "(0 to 1).",
+    )
+    ease_in_frames: int = Field(
+        6, ge=1, le=60, description="Frames from the neutral into the performance (frames)."
+    )
+    intensity: float = Field(
+        1.0, gt=0, le=1.5, description="Scale of generated expressions (1: full weights)."
+    )
+    head_turn_deg: float = Field(
+        2.5, ge=0, le=20, description="Largest turn of the head during a take (degrees)."
+    )
+    head_shift_mm: float = Field(
+        2.0, ge=0, le=20, description="Largest shift of the head during a take (mm)."
+    )
+    occlusion_directions: int = Field(
+        192,
+        ge=32,
+        le=4096,
+        description="Directions of the sky that ambient occlusion samples (rays a vertex, half of "
+        "them above its horizon).",
+    )
+    light_samples: int = Field(
+        12, ge=1, le=256, description="Points sampled on each area light (rays a vertex)."
+    )
+    edge_samples: int = Field(
+        4, ge=1, le=16, description="Rays a pixel where an edge crosses it (anti-aliasing)."
+    )
+    noise_read: float = Field(
+        0.0012, ge=0, le=0.1, description="Deviation of the sensor's read noise (linear, 0 to 1)."
+    )
+    noise_shot: float = Field(
+        0.00003,
+        ge=0,
+        le=0.01,
+        description="Variance of the sensor's shot noise at full brightness (linear, squared).",
+    )
+    contour_labels: int = Field(
+        6, ge=0, le=1000, description="Labelled contour frames of a take (frames)."
+    )
+    seed: int = Field(0, ge=0, description="Seed that all others are mixed with.")

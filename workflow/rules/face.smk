@@ -1,0 +1,50 @@
+"""The linear face model in its three parts: studio, template (topology of H), tracker (of C)."""
+
+
+rule face_archive:
+    """Downloads the pinned ICT-FaceKit archive and checks its SHA-256."""
+    output:
+        f"{R}/face/ict-facekit.archive",
+    log:
+        f"{R}/logs/face_archive.log",
+    benchmark:
+        f"{R}/benchmarks/face_archive.tsv"
+    params:
+        cfg=cfg_of("face_model", "url", "sha256"),
+        code=code_of("face_archive"),
+    resources:
+        mem_mb=500,
+        runtime=60,
+    localrule: True
+    script:
+        "../scripts/face_archive.py"
+
+
+def face_source(wildcards):
+    """The file that the face model is read from: none for `procedural`."""
+    model = CONFIG.face_model
+    if model.name == "procedural":
+        return []
+    return [model.path] if model.path else [f"{R}/face/ict-facekit.archive"]
+
+
+rule face_model:
+    """Builds the studio, template and tracker models of the configured face model."""
+    input:
+        source=face_source,
+    output:
+        studio=f"{R}/face/studio.npz",
+        template=f"{R}/face/template.npz",
+        tracker=f"{R}/face/tracker.npz",
+    log:
+        f"{R}/logs/face_model.log",
+    benchmark:
+        f"{R}/benchmarks/face_model.tsv"
+    params:
+        cfg=cfg_of("face_model"),
+        code=code_of("face_model"),
+    resources:
+        mem_mb=3000,
+        runtime=20,
+    script:
+        "../scripts/face_model.py"
