@@ -1,0 +1,106 @@
+"""Configuration of the evaluation stage."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class ReferenceConfig(StageConfig):
+    """What results are compared with."""
+
+    truth: str | None = Field(
+        None,
+        description="Folder of known truth, `<subject>/<take>/vertices_mm.npy` and `triangles.npy` "
+        "inside; read by the evaluation alone. Empty: the studio's truth for the takes that the "
+        "studio made, and the held-out reconstruction H for the others.",
+    )
+    max_distance_mm: float = Field(
+        6.0,
+        gt=0.0,
+        le=50.0,
+        description="A vertex farther than this from the truth's neutral has no counterpart and is "
+        "not measured (mm).",
+    )
+    max_normal_angle_deg: float = Field(
+        60.0,
+        gt=0.0,
+        lt=90.0,
+        description="Largest angle between the normals of a vertex and of its counterpart "
+        "(degrees).",
+    )
+
+
+class MeasuresConfig(StageConfig):
+    """Figures and their confidence intervals."""
+
+    clip_frames: int = Field(
+        15,
+        ge=1,
+        description="Length of the clips that the confidence intervals are taken over (frames).",
+    )
+    bootstrap_samples: int = Field(
+        1000, ge=100, le=100_000, description="Bootstrap samples of an interval (samples)."
+    )
+    confidence: float = Field(
+        0.95, gt=0.5, lt=1.0, description="Confidence of the intervals (0.5 to 1)."
+    )
+    touch_mm: float = Field(
+        0.3,
+        ge=0.0,
+        le=2.0,
+        description="Lips touch in truth where their gap is at most this everywhere in the middle "
+        "half of the mouth (mm).",
+    )
+    gape_mm: float = Field(
+        1.0,
+        gt=0.0,
+        le=10.0,
+        description="A result is falsely open where the lips touch in truth and its gap is over "
+        "this (mm).",
+    )
+    seed: int = Field(0, ge=0, description="Seed of the bootstrap.")
+
+
+class FiguresConfig(StageConfig):
+    """Pictures of the report."""
+
+    error_scale_mm: float = Field(
+        5.0, gt=0.0, le=50.0, description="Error shown in the hottest colour of error maps (mm)."
+    )
+    map_frames: int = Field(
+        3,
+        ge=1,
+        le=12,
+        description="Frames a take in the error maps: those of the largest error of the base track "
+        "in as many equal stretches (frames).",
+    )
+    map_size_px: int = Field(300, ge=100, le=1200, description="Width of one error map (pixels).")
+    embed_video_mb: float = Field(
+        8.0,
+        ge=0.0,
+        le=200.0,
+        description="Overlay videos up to this size are embedded in the summary; larger ones are "
+        "named (megabytes).",
+    )
+
+
+class EvaluationConfig(StageConfig):
+    """Errors against truth or a held-out reconstruction (Lips16 section 6)."""
+
+    reference: ReferenceConfig = Field(
+        default_factory=ReferenceConfig, description="What results are compared with."
+    )
+    variants: list[Literal["affine", "shape-only", "distances-only"]] = Field(
+        [],
+        description="Variants of the regressors to evaluate beside them; training must make them.",
+    )
+    measures: MeasuresConfig = Field(
+        default_factory=MeasuresConfig, description="Figures and their intervals."
+    )
+    figures: FiguresConfig = Field(
+        default_factory=FiguresConfig, description="Pictures of the report."
+    )

@@ -1,0 +1,159 @@
+"""Nearest points of a triangle mesh, with conditions on the triangles that may be chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vermilion.mesh import triangle_areas, triangle_normals
+
+_FIRST_CANDIDATES = 12
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on a mesh.
+
+    Attributes:
+        triangle: (N,) int64, -1 where no triangle fulfils the conditions.
+        barycentric: (N, 3) float64.
+        distance_mm: (N,) float64 to the query, infinite where there is none.
+    """
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    distance_mm: np.ndarray
+
+    @property
+    def found(self) -> np.ndarray:
+        return self.triangle >= 0
+
+    def on(self, vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """The points on other vertices (..., V, 3) of the same topology, (..., N, 3); NaN if none."""
+        corners = vertices_mm[..., triangles[np.maximum(self.triangle, 0)], :]
+        points = np.einsum("nk,...nkd->...nd", self.barycentric, corners)
+        points[..., ~self.found, :] = np.nan
+        return points
+
+
+class Surface:
+    """A mesh prepared for nearest-point queries; exact, by candidates of a k-d tree.
+
+    Triangles without area are left out.
+    """
+
+    def __init__(self, vertices_mm: np.ndarray, triangles: np.ndarray):
+        vertices = np.asarray(vertices_mm, dtype=np.float64)
+        kept = np.flatnonzero(triangle_areas(vertices, triangles) > 1e-9)
+        self.ids = kept
+        self.corners = np.ascontiguousarray(vertices[triangles[kept]])
+        self.normals = triangle_normals(vertices, triangles[kept])
+        centroids = self.corners.mean(axis=1)
+        radii = np.linalg.norm(self.corners - centroids[:, None], axis=2).max(axis=1)
+        # Few large triangles would force long candidate lists: they are searched for by themselves.
+        bound = np.quantile(radii, 0.98)
+        self._groups = []
+        for members in (np.flatnonzero(radii <= bound), np.flatnonzero(radii > bound)):
+            if len(members):
+                self._groups.append((members, cKDTree(centroids[members]), radii[members].max()))
+
+    def closest(
+        self,
+        points_mm: np.ndarray,
+        normals: np.ndarray | None = None,
+        min_cosine: float = 0.5,
+        labels: np.ndarray | None = None,
+        triangle_labels: np.ndarray | None = None,
+    ) -> SurfacePoints:
+        """Nearest point of the mesh to each of `points_mm` (N, 3).
+
+        With `normals` (N, 3), only triangles whose normal makes a cosine of at least `min_cosine`
+        count. With `labels` (N,) and `triangle_labels` (T,) of all triangles, only triangles with an
+        equal label count; label 0 goes with every label. Conditions are met among the 96 nearest
+        triangles or not at all.
+        """
+        points = np.ascontiguousarray(points_mm, dtype=np.float64)
+        conditional = normals is not None or labels is not None
+        given = np.zeros((len(points), 3)) if normals is None else np.asarray(normals, float)
+        cosine = -2.0 if normals is None else min_cosine
+        wanted = np.zeros(len(points), np.int64) if labels is None else np.asarray(labels, np.int64)
+        owned = np.zeros(len(self.ids), np.int64)
+        if triangle_labels is not None:
+            owned = np.asarray(triangle_labels, np.int64)[self.ids]
+        best = np.full(len(points), np.inf)
+        triangle = np.full(len(points), -1, np.int64)
+        barycentric = np.zeros((len(points), 3))
+        for members, tree, radius in self._groups:
+            todo, k = np.arange(len(points)), 96 if conditional else _FIRST_CANDIDATES
+            while len(todo):
+                k = min(k, len(members))
+                far, near = tree.query(points[todo], k=k)
+                near = members[near.reshape(len(todo), k)]
+                far = far.reshape(len(todo), k)[:, -1]
+                _closest_of(
+                    points, given, wanted, todo, near, self.corners, self.normals, owned,
+                    cosine, best, triangle, barycentric,
+                )  # fmt: skip
+                if conditional or k == len(members):
+                    break
+                todo = todo[far < best[todo] + radius]
+                k *= 4
+        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
+        return SurfacePoints(triangle, barycentric, best)
+
+
+@numba.njit(cache=True)
+def _closest_of(  # pragma: no cover - compiled
+    points, normals, labels, rows, candidates, corners, face_normals, face_labels,
+    min_cosine, best, triangle, barycentric,
+):  # fmt: skip
+    """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
+    for index in range(len(rows)):
+        row = rows[index]
+        p = points[row]
+        for t in candidates[index]:
+            if labels[row] != 0 and face_labels[t] != 0 and labels[row] != face_labels[t]:
+                continue
+            if min_cosine > -1.0 and np.dot(normals[row], face_normals[t]) < min_cosine:
+                continue
+            u, v, w = _project(p, corners[t, 0], corners[t, 1], corners[t, 2])
+            q = u * corners[t, 0] + v * corners[t, 1] + w * corners[t, 2]
+            distance = np.sqrt(((p - q) ** 2).sum())
+            if distance < best[row]:
+                best[row] = distance
+                triangle[row] = t
+                barycentric[row, 0], barycentric[row, 1], barycentric[row, 2] = u, v, w
+
+
+@numba.njit(cache=True)
+def _project(p, a, b, c):  # pragma: no cover - compiled
+    """Barycentric weights of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
+    ab, ac, ap = b - a, c - a, p - a
+    d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
+    if d1 <= 0 and d2 <= 0:
+        return 1.0, 0.0, 0.0
+    bp = p - b
+    d3, d4 = np.dot(ab, bp), np.dot(ac, bp)
+    if d3 >= 0 and d4 <= d3:
+        return 0.0, 1.0, 0.0
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0 and d1 >= 0 and d3 <= 0:
+        v = d1 / (d1 - d3)
+        return 1.0 - v, v, 0.0
+    cp = p - c
+    d5, d6 = np.dot(ab, cp), np.dot(ac, cp)
+    if d6 >= 0 and d5 <= d6:
+        return 0.0, 0.0, 1.0
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0 and d2 >= 0 and d6 <= 0:
+        w = d2 / (d2 - d6)
+        return 1.0 - w, 0.0, w
+    va = d3 * d6 - d5 * d4
+    if va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        return 0.0, 1.0 - w, w
+    total = va + vb + vc
+    return va / total, vb / total, vc / total

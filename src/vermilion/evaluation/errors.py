@@ -1,0 +1,191 @@
+"""Errors of a mesh sequence against its reference, summed by clip so that takes can be joined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vermilion.evaluation.closest import Surface
+from vermilion.evaluation.lips import aperture_mm, lip_gaps
+from vermilion.evaluation.masks import Regions
+from vermilion.evaluation.reference import Reference
+from vermilion.evaluation.statistics import histograms
+
+
+@dataclass(frozen=True)
+class ClipSums:
+    """Sums of one regressor over the frames of each clip; sums of takes are joined end to end.
+
+    Attributes:
+        sums: name -> (clips, ...) float64. Names that end in `.max` hold maxima.
+    """
+
+    sums: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __add__(self, other: ClipSums) -> ClipSums:
+        """Further sums of the same clips."""
+        return ClipSums({**self.sums, **other.sums})
+
+    @staticmethod
+    def joined(parts: Iterable[ClipSums]) -> ClipSums:
+        """The clips of several takes after one another; only what all of them have."""
+        parts = list(parts)
+        common = set.intersection(*(set(part.sums) for part in parts))
+        return ClipSums(
+            {name: np.concatenate([part.sums[name] for part in parts]) for name in sorted(common)}
+        )
+
+
+def vertex_errors(aligned_mm: np.ndarray, reference: Reference) -> np.ndarray:
+    """Distance of each vertex to its corresponding point, (F, V) mm; NaN where there is none."""
+    return np.linalg.norm(aligned_mm - reference.points_mm, axis=2)
+
+
+def surface_errors(
+    sequences_mm: dict[str, np.ndarray],
+    reference: Reference,
+    vertices: np.ndarray,
+    frame_done: Callable[[Iterable], Iterable] = iter,
+) -> dict[str, np.ndarray]:
+    """Distance of each vertex to the nearest point of the reference's surface.
+
+    Args:
+        sequences_mm: name -> (F, V, 3) in the reference's world.
+        vertices: (V,) bool: which vertices to measure; the others are NaN.
+        frame_done: wraps the loop over frames, for progress.
+
+    Returns:
+        name -> (F, V) mm.
+    """
+    ids = np.flatnonzero(vertices)
+    errors = {
+        name: np.full(sequence.shape[:2], np.nan, dtype=np.float32)
+        for name, sequence in sequences_mm.items()
+    }
+    for frame in frame_done(range(len(reference.vertices_mm))):
+        surface = Surface(reference.vertices_mm[frame], reference.triangles)
+        for name, sequence in sequences_mm.items():
+            points = np.asarray(sequence[frame][ids], dtype=np.float64)
+            finite = np.isfinite(points).all(axis=1)
+            errors[name][frame, ids[finite]] = surface.closest(points[finite]).distance_mm
+    return errors
+
+
+def second_differences(sequence_mm: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """|x[f-1] - 2 x[f] + x[f+1]|, (F, V) mm; NaN where a neighbouring frame is missing."""
+    result = np.full(sequence_mm.shape[:2], np.nan)
+    if len(frames) < 3:
+        return result
+    inner = (np.diff(frames)[:-1] == 1) & (np.diff(frames)[1:] == 1)
+    second = sequence_mm[:-2] - 2 * sequence_mm[1:-1] + sequence_mm[2:]
+    result[1:-1] = np.where(inner[:, None], np.linalg.norm(second, axis=2), np.nan)
+    return result
+
+
+def sums_of_errors(
+    vertex_mm: np.ndarray,
+    surface_mm: np.ndarray,
+    regions: Regions,
+    clips: np.ndarray,
+) -> ClipSums:
+    """Sums behind vertex and surface errors, of (F, V) errors and the clip of each frame (F,)."""
+    sums = {}
+    for region, weights in regions.weights.items():
+        sums[f"{region}.weight"], sums[f"{region}.error"] = _weighted_sums(
+            vertex_mm, weights, clips
+        )
+        _, sums[f"{region}.square"] = _weighted_sums(vertex_mm**2, weights, clips)
+        inside = np.where(weights > 0, surface_mm, np.nan)
+        sums[f"{region}.histogram"] = by_clip(histograms(inside, weights), clips)
+        largest = np.nan_to_num(inside).max(axis=1)
+        sums[f"{region}.max"] = by_clip(largest, clips, np.maximum)
+    return ClipSums(sums)
+
+
+def sums_of_jitter(
+    aligned_mm: np.ndarray,
+    reference: Reference,
+    frames: np.ndarray,
+    regions: Regions,
+    clips: np.ndarray,
+) -> ClipSums:
+    """Sums behind `jitter_mm`: second differences of the result minus those of the reference."""
+    excess = second_differences(aligned_mm, frames) - second_differences(
+        reference.points_mm, frames
+    )
+    sums = {}
+    for region, weights in regions.weights.items():
+        weight, jitter = _weighted_sums(excess, weights, clips)
+        sums[f"{region}.jitter_weight"], sums[f"{region}.jitter"] = weight, jitter
+    return ClipSums(sums)
+
+
+def sums_of_aperture(
+    result_gaps: np.ndarray,
+    reference_gaps: np.ndarray,
+    clips: np.ndarray,
+    touch_mm: float,
+    gape_mm: float,
+) -> ClipSums:
+    """Sums behind `aperture_error_mm` and `false_open_rate`, of gaps (F, columns) mm.
+
+    Lips touch where no column of the reference is open by more than `touch_mm`; they gape where a
+    column of the result is open by more than `gape_mm`.
+    """
+    difference = np.abs(aperture_mm(result_gaps) - aperture_mm(reference_gaps))
+    known = np.isfinite(difference)
+    touch = known & (_widest(reference_gaps) <= touch_mm)
+    gape = touch & (_widest(result_gaps) > gape_mm)
+    return ClipSums(
+        {
+            "mouth.aperture_frames": by_clip(known.astype(float), clips),
+            "mouth.aperture": by_clip(np.where(known, difference, 0.0), clips),
+            "mouth.touch_frames": by_clip(touch.astype(float), clips),
+            "mouth.false_open": by_clip(gape.astype(float), clips),
+        }
+    )
+
+
+def gaps_in_head(
+    points_mm: np.ndarray,
+    head_rotations: np.ndarray,
+    sides: np.ndarray,
+    columns: np.ndarray,
+) -> np.ndarray:
+    """`lip_gaps` of (F, V, 3) in a world whose rotations to the head frame are (F, 3, 3)."""
+    return lip_gaps(np.matmul(points_mm, head_rotations.transpose(0, 2, 1)), sides, columns)
+
+
+def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
+    """Sums of one figure a frame, (F,); NaN frames do not count."""
+    known = np.isfinite(values)
+    return ClipSums(
+        {
+            f"{name}_frames": by_clip(known.astype(float), clips),
+            name: by_clip(np.where(known, values, 0.0), clips),
+        }
+    )
+
+
+def by_clip(values: np.ndarray, clips: np.ndarray, combine: np.ufunc = np.add) -> np.ndarray:
+    """Combine (F, ...) values frame by frame into (clips, ...)."""
+    result = np.zeros((int(clips.max()) + 1, *values.shape[1:]))
+    combine.at(result, clips, values)
+    return result
+
+
+def _weighted_sums(
+    values: np.ndarray, weights: np.ndarray, clips: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of weights and of weighted values of each clip, (clips,) each."""
+    finite = np.isfinite(values)
+    weight = (finite * weights).sum(axis=1)
+    total = (np.where(finite, values, 0.0) * weights).sum(axis=1)
+    return by_clip(weight, clips), by_clip(total, clips)
+
+
+def _widest(gaps: np.ndarray) -> np.ndarray:
+    """Largest gap of each frame, (F,); 0 where none is known."""
+    return np.nan_to_num(gaps).max(axis=1)

@@ -1,0 +1,68 @@
+"""The gap between the lips, the same way for truth and result."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.evaluation.masks import lip_labels
+from vermilion.faces.model import FaceModel
+from vermilion.mesh import adjacency
+
+N_COLUMNS = 7
+_GROW_RINGS = 2
+
+
+def lip_sides(model: FaceModel) -> np.ndarray:
+    """(V,) int8: 1 upper lip, 2 lower, 0 neither; the vermilion and a little of the lips' inside."""
+    labels = lip_labels(model)
+    neighbours = adjacency(model.triangles, model.n_vertices)
+    for _ in range(_GROW_RINGS):
+        upper, lower = (neighbours @ (labels == side) > 0 for side in (1, 2))
+        free = (labels == 0) & model.regions["mouth_inner"] & ~(upper & lower)
+        labels = np.where(free & upper, 1, np.where(free & lower, 2, labels)).astype(np.int8)
+    return labels
+
+
+def columns_of(model: FaceModel) -> np.ndarray:
+    """(V,) column of each lip vertex within the middle half of the mouth, -1 outside.
+
+    The columns stand side by side from the subject's right to their left, in the neutral.
+    """
+    sides = lip_sides(model)
+    x = model.neutral_mm[:, 0]
+    vermilion = lip_labels(model) > 0
+    low, high = np.quantile(x[vermilion], [0.0, 1.0])
+    start, width = low + 0.25 * (high - low), 0.5 * (high - low) / N_COLUMNS
+    column = np.floor((x - start) / width).astype(np.int64)
+    return np.where((sides > 0) & (column >= 0) & (column < N_COLUMNS), column, -1)
+
+
+def lip_gaps(points_mm: np.ndarray, sides: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Height of the gap in each column, (F, N_COLUMNS) mm; 0 where the lips touch or overlap.
+
+    Lowest point of the upper lip minus highest point of the lower lip.
+
+    Args:
+        points_mm: (F, V, 3) in the head frame (y up); NaN points do not count.
+        sides, columns: (V,) of `lip_sides`, `columns_of`.
+    """
+    gaps = np.full((len(points_mm), N_COLUMNS), np.nan)
+    height = points_mm[..., 1]
+    for column in range(N_COLUMNS):
+        upper = height[:, (columns == column) & (sides == 1)]
+        lower = height[:, (columns == column) & (sides == 2)]
+        if upper.shape[1] == 0 or lower.shape[1] == 0:
+            continue
+        lowest = np.where(np.isfinite(upper), upper, np.inf).min(axis=1)
+        highest = np.where(np.isfinite(lower), lower, -np.inf).max(axis=1)
+        gap = np.maximum(lowest - highest, 0.0)
+        gaps[:, column] = np.where(np.isfinite(gap), gap, np.nan)
+    return gaps
+
+
+def aperture_mm(gaps: np.ndarray) -> np.ndarray:
+    """Mean gap of the middle half of the mouth, (F,) mm, of gaps (F, columns)."""
+    finite = np.isfinite(gaps)
+    count = finite.sum(axis=1)
+    total = np.where(finite, gaps, 0.0).sum(axis=1)
+    return np.divide(total, count, out=np.full(len(gaps), np.nan), where=count > 0)

@@ -1,0 +1,78 @@
+"""Where errors are taken: vermilion, mouth mask, face, and the rest that holds the alignment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.faces.model import FaceModel
+from vermilion.mesh import vertex_areas
+
+REGION_NAMES = ("vermilion", "mouth", "face")
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Area of each vertex within each region of one topology.
+
+    Attributes:
+        weights: region name -> (V,) area in mm2, zero outside the region.
+        rest: (V,) area in mm2 of the face outside the mouth mask, for the alignment.
+        lips: (V,) int8: 1 upper vermilion, 2 lower, 0 elsewhere.
+    """
+
+    weights: dict[str, np.ndarray]
+    rest: np.ndarray
+    lips: np.ndarray
+
+    @property
+    def used(self) -> np.ndarray:
+        """(V,) bool: vertices that any region or the alignment needs."""
+        return (np.stack(list(self.weights.values())) > 0).any(axis=0) | (self.rest > 0)
+
+    def restricted(self, valid: np.ndarray) -> Regions:
+        """The regions without the vertices that have no counterpart in the truth."""
+        weights = {name: np.where(valid, w, 0.0) for name, w in self.weights.items()}
+        return Regions(weights, np.where(valid, self.rest, 0.0), self.lips)
+
+
+def lip_labels(model: FaceModel) -> np.ndarray:
+    """(V,) int8: 1 upper vermilion, 2 lower, 0 elsewhere."""
+    labels = np.zeros(model.n_vertices, dtype=np.int8)
+    labels[model.regions["vermilion_upper"]] = 1
+    labels[model.regions["vermilion_lower"]] = 2
+    return labels
+
+
+def regions_of_mask(
+    model: FaceModel, neutral_mm: np.ndarray, mouth_triangles: np.ndarray
+) -> Regions:
+    """Regions of a topology whose mouth mask is given.
+
+    Args:
+        model: names the face, the vermilion and the inside of the mouth.
+        neutral_mm: (V, 3) of the person, for the areas.
+        mouth_triangles: triangles of the correction layer, ids or (T,) bool. The inside of the mouth
+            does not count, even where the layer covers it: no camera sees it.
+    """
+    triangles = model.triangles
+    mask = np.zeros(len(triangles), dtype=bool)
+    mask[mouth_triangles] = True
+    seen = ~(model.regions["mouth_inner"] | model.regions["eyes"] | model.regions["teeth"])
+    lips = lip_labels(model)
+    face = (model.regions["face"] | (lips > 0)) & (seen | (lips > 0))
+
+    def area(of_triangles: np.ndarray, of_vertices: np.ndarray) -> np.ndarray:
+        chosen = triangles[of_triangles]
+        return np.where(of_vertices, vertex_areas(neutral_mm, chosen), 0.0)
+
+    everywhere = np.ones(len(triangles), dtype=bool)
+    touched = np.zeros(model.n_vertices, dtype=bool)
+    touched[triangles[mask].ravel()] = True
+    weights = {
+        "vermilion": area(everywhere, lips > 0),
+        "mouth": area(mask, face),
+        "face": area(everywhere, face),
+    }
+    return Regions(weights, area(everywhere, face & ~touched), lips)

@@ -1,0 +1,142 @@
+"""What a result is compared with: truth, or a held-out reconstruction, in correspondence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.evaluation.closest import Surface, SurfacePoints
+from vermilion.mesh import vertex_normals
+
+_CROP_MARGIN_MM = 25.0
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The surface that a take should have had.
+
+    Attributes:
+        kind: `truth` or `H`.
+        points_mm: (F, V, 3) where each vertex of the compared topology belongs; NaN where unknown.
+        vertices_mm: (F, S, 3) the surface itself.
+        triangles: (U, 3) of the surface.
+    """
+
+    kind: str
+    points_mm: np.ndarray
+    vertices_mm: np.ndarray
+    triangles: np.ndarray
+
+    @property
+    def valid(self) -> np.ndarray:
+        """(V,) bool: vertices with a counterpart."""
+        return np.isfinite(self.points_mm).all(axis=(0, 2))
+
+
+def reference_of(
+    kind: str, where: SurfacePoints, vertices_mm: np.ndarray, triangles: np.ndarray
+) -> Reference:
+    """Follow `where` (V points on the surface) through the surface's frames (F, S, 3).
+
+    The surface is cropped to the surroundings of the points in the first frame: the back of a head
+    is no neighbour of a face.
+    """
+    points = where.on(np.asarray(vertices_mm, dtype=np.float64), triangles)
+    first = points[0][np.isfinite(points[0]).all(axis=1)]
+    low, high = first.min(axis=0) - _CROP_MARGIN_MM, first.max(axis=0) + _CROP_MARGIN_MM
+    near = ((vertices_mm[0] >= low) & (vertices_mm[0] <= high)).all(axis=1)
+    return Reference(kind, points, vertices_mm, triangles[near[triangles].all(axis=1)])
+
+
+def attach(
+    points_mm: np.ndarray,
+    normals: np.ndarray,
+    lips: np.ndarray,
+    surface: Surface,
+    triangle_lips: np.ndarray,
+    max_distance_mm: float,
+    min_cosine: float,
+) -> SurfacePoints:
+    """The point of a surface that each given point lies on, in the neutral, once a subject.
+
+    Nearest point among the triangles that face the same way and do not belong to the other lip.
+    Points farther away than `max_distance_mm` have none.
+
+    Args:
+        points_mm, normals: (N, 3) in the surface's world.
+        lips: (N,) 1 upper, 2 lower, 0 neither.
+        triangle_lips: (T,) the same of the surface's triangles.
+    """
+    found = surface.closest(points_mm, normals, min_cosine, lips, triangle_lips)
+    far = found.distance_mm > max_distance_mm
+    return SurfacePoints(
+        np.where(far, -1, found.triangle),
+        found.barycentric,
+        np.where(far, np.inf, found.distance_mm),
+    )
+
+
+def transfer_lips(
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    lips: np.ndarray,
+    to_vertices_mm: np.ndarray,
+    to_triangles: np.ndarray,
+    max_distance_mm: float,
+    min_cosine: float,
+) -> np.ndarray:
+    """Lip labels (T',) of the triangles of another mesh of the same face in the same pose.
+
+    Args:
+        vertices_mm, triangles, lips: the labelled mesh, labels (V,).
+        to_vertices_mm, to_triangles: the mesh without labels.
+    """
+    source = Surface(vertices_mm, triangles)
+    normals = vertex_normals(to_vertices_mm, to_triangles)
+    found = source.closest(to_vertices_mm, normals, min_cosine)
+    near = found.found & (found.distance_mm <= max_distance_mm)
+    of_triangle = lips[triangles].max(axis=1)
+    labels = np.where(near, of_triangle[np.maximum(found.triangle, 0)], 0)
+    corners = labels[to_triangles]
+    # A triangle with corners on both lips is on neither.
+    both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
+    return np.where(both, 0, corners.max(axis=1))
+
+
+def truth_of_vertices(
+    where_on_h: SurfacePoints,
+    h_neutral_mm: np.ndarray,
+    h_triangles: np.ndarray,
+    h_lips: np.ndarray,
+    lips: np.ndarray,
+    truth_neutral_mm: np.ndarray,
+    truth_triangles: np.ndarray,
+    max_distance_mm: float,
+    min_cosine: float,
+) -> SurfacePoints:
+    """The truth's point of each vertex of C: C vertex -> H -> nearest point of the truth's neutral.
+
+    Both neutrals are the same frame of the same take in the same world. No triangle of one lip is
+    taken for a vertex of the other.
+
+    Args:
+        where_on_h: (V,) points of C's vertices on H.
+        h_lips: (Vh,) lip labels of H's vertices; lips: (V,) of C's.
+    """
+    labels = transfer_lips(
+        h_neutral_mm, h_triangles, h_lips, truth_neutral_mm, truth_triangles,
+        max_distance_mm, min_cosine,
+    )  # fmt: skip
+    points = where_on_h.on(h_neutral_mm, h_triangles)
+    normals = where_on_h.on(vertex_normals(h_neutral_mm, h_triangles), h_triangles)
+    known = where_on_h.found
+    found = attach(
+        np.nan_to_num(points), np.nan_to_num(normals), lips,
+        Surface(truth_neutral_mm, truth_triangles), labels, max_distance_mm, min_cosine,
+    )  # fmt: skip
+    return SurfacePoints(
+        np.where(known, found.triangle, -1),
+        found.barycentric,
+        np.where(known, found.distance_mm, np.inf),
+    )

@@ -1,0 +1,104 @@
+"""Area-weighted statistics and their confidence intervals over clips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Surface errors are counted in bins this wide; interpolation within a bin makes percentiles finer.
+BIN_MM = 0.01
+N_BINS = 3000
+
+
+def weighted_mean(values: np.ndarray, weights: np.ndarray) -> float:
+    """Mean of (..., V) values with (V,) weights; NaN values do not count."""
+    weights = np.broadcast_to(weights, values.shape) * np.isfinite(values)
+    return float((np.nan_to_num(values) * weights).sum() / weights.sum())
+
+
+def weighted_std(values: np.ndarray, weights: np.ndarray) -> float:
+    """Standard deviation of (..., V) values with (V,) weights; NaN values do not count."""
+    mean = weighted_mean(values, weights)
+    return float(np.sqrt(weighted_mean((values - mean) ** 2, weights)))
+
+
+def weighted_quantile(values: np.ndarray, weights: np.ndarray, q: float) -> float:
+    """Smallest value below which lies the share `q` of the weight; NaN values do not count."""
+    weights = np.broadcast_to(weights, values.shape).ravel()
+    values = values.ravel()
+    chosen = np.isfinite(values) & (weights > 0)
+    order = np.argsort(values[chosen], kind="stable")
+    cumulative = np.cumsum(weights[chosen][order])
+    place = np.searchsorted(cumulative, q * cumulative[-1])
+    return float(values[chosen][order][min(place, len(order) - 1)])
+
+
+def histograms(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weight in each bin of `BIN_MM`, a row a frame: (F, V) mm, (V,) -> (F, N_BINS).
+
+    Values beyond the last bin are counted in it.
+    """
+    chosen = weights > 0
+    values = values[:, chosen]
+    bins = np.clip(np.nan_to_num(values) / BIN_MM, 0, N_BINS - 1).astype(np.int64)
+    bins += np.arange(len(values))[:, None] * N_BINS
+    flat = np.where(np.isfinite(values), weights[chosen], 0.0).ravel()
+    counts = np.bincount(bins.ravel(), weights=flat, minlength=len(values) * N_BINS)
+    return counts.reshape(len(values), N_BINS)
+
+
+def histogram_quantile(histogram: np.ndarray, q: float) -> np.ndarray:
+    """Quantile in mm of histograms (..., N_BINS), interpolated within the bin."""
+    cumulative = np.cumsum(histogram, axis=-1)
+    target = q * cumulative[..., -1:]
+    place = np.minimum((cumulative < target).sum(axis=-1, keepdims=True), N_BINS - 1)
+    inside = np.take_along_axis(histogram, place, axis=-1)
+    before = np.take_along_axis(cumulative, place, axis=-1) - inside
+    share = np.divide(target - before, inside, out=np.zeros_like(inside), where=inside > 0)
+    value = (place + share)[..., 0] * BIN_MM
+    return np.where(cumulative[..., -1] > 0, value, np.nan)
+
+
+def clips_of(frames: np.ndarray, clip_frames: int) -> np.ndarray:
+    """Number of the clip of each frame (F,): runs of at most `clip_frames` consecutive frames.
+
+    A gap in the frame numbers starts a new clip.
+    """
+    frames = np.asarray(frames)
+    clips = np.zeros(len(frames), dtype=np.int64)
+    for index in range(1, len(frames)):
+        start = np.flatnonzero(clips == clips[index - 1])[0]
+        same = frames[index] == frames[index - 1] + 1 and index - start < clip_frames
+        clips[index] = clips[index - 1] + (not same)
+    return clips
+
+
+@dataclass(frozen=True)
+class Resampling:
+    """How often each clip is drawn in each bootstrap sample.
+
+    Attributes:
+        draws: (samples, clips) int64.
+        confidence: of the interval, such as 0.95.
+    """
+
+    draws: np.ndarray
+    confidence: float
+
+    @classmethod
+    def of(cls, n_clips: int, samples: int, seed: int, confidence: float) -> Resampling:
+        """Draw `n_clips` clips with replacement, `samples` times."""
+        chosen = np.random.default_rng(seed).integers(0, n_clips, (samples, n_clips))
+        draws = np.zeros((samples, n_clips), dtype=np.int64)
+        np.add.at(draws, (np.arange(samples)[:, None], chosen), 1)
+        return cls(draws, confidence)
+
+    def interval(self, values: np.ndarray) -> tuple[float, float]:
+        """Percentile interval of a statistic of each sample (samples,); NaN with under two clips."""
+        values = values[np.isfinite(values)]
+        if self.draws.shape[1] < 2 or len(values) == 0:
+            return np.nan, np.nan
+        tail = (1 - self.confidence) / 2
+        low, high = np.quantile(values, [tail, 1 - tail])
+        return float(low), float(high)

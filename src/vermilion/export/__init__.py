@@ -1,0 +1,1 @@
+"""Files that other programs open: OBJ, USD, weights as CSV, overlay video."""
