@@ -1,0 +1,1 @@
+"""Geometry-guided removal of a lip tattoo (Lips16 3.2.1)."""

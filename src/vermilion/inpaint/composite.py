@@ -1,0 +1,136 @@
+"""Rendering the painted texture through a mesh into a camera, and compositing it (Lips16 3.2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.inpaint.domain import LipDomain
+from vermilion.inpaint.fields import blur, sample, weighted_blur
+from vermilion.raycast import RayCaster
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of a picture: left, top, width, height in pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What is painted into a window of a picture.
+
+    Attributes:
+        window: where.
+        rgb: (h, w, 3) float32 linear colour times opacity (premultiplied).
+        opacity: (h, w) in [0, 1], share of the pixel that is painted.
+        open: (h, w) in [0, 1], share of the pixel that shows no skin: mouth opening, background.
+    """
+
+    window: Window
+    rgb: np.ndarray
+    opacity: np.ndarray
+    open: np.ndarray
+
+
+def window_of(
+    domain: LipDomain, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray, margin_px: int
+) -> Window | None:
+    """The rectangle that the domain's vertices project into; None where outside the picture."""
+    pixels = camera.project(vertices_mm[np.unique(triangles[domain.in_domain])])
+    pixels = pixels[np.isfinite(pixels).all(axis=1)]
+    if not len(pixels):
+        return None
+    low = np.floor(pixels.min(axis=0)).astype(int) - margin_px
+    high = np.ceil(pixels.max(axis=0)).astype(int) + margin_px
+    low, high = np.maximum(low, 0), np.minimum(high, [camera.width_px, camera.height_px])
+    if (high - low < 4).any():
+        return None
+    return Window(int(low[0]), int(low[1]), *(int(n) for n in high - low))
+
+
+def render_layer(
+    domain: LipDomain,
+    texture: np.ndarray,
+    opacity: np.ndarray,
+    caster: RayCaster,
+    camera: Camera,
+    window: Window,
+    samples: int = 3,
+) -> Layer:
+    """Render a texture (h, w, 3) and its opacity (h, w), `samples` squared rays a pixel."""
+    size = (window.height * samples, window.width * samples)
+    x, y = np.meshgrid(np.arange(size[1]) + 0.5, np.arange(size[0]) + 0.5)
+    pixels = np.stack([x, y], axis=-1) / samples + [window.x, window.y]
+    hits = caster.cast(*camera.rays(pixels))
+    triangle = np.maximum(hits.triangle, 0)
+    on_domain = hits.hit & domain.in_domain[triangle]
+    corners = caster.triangles[triangle]
+    texel = (domain.texel_of_vertex[corners] * hits.barycentric[..., None]).sum(axis=-2)
+    alpha = np.where(on_domain, sample(opacity, texel), 0.0)
+    colour = sample(texture, texel) * alpha[..., None]
+    # The mouth's inside and the background; bare skin outside the domain stays as it is.
+    outside = ~hits.hit | (~on_domain & ~domain.skin[triangle])
+    shrink = (window.width, window.height)
+    return Layer(
+        window,
+        cv2.resize(colour.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
+        cv2.resize(alpha.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
+        cv2.resize(outside.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
+    )
+
+
+def softened(layer: Layer, sigma_px: float) -> Layer:
+    """The layer seen through a lens: a Gaussian of `sigma_px`."""
+    if sigma_px <= 0:
+        return layer
+    edge = int(np.ceil(3 * sigma_px))
+    opened = cv2.copyMakeBorder(layer.open, *[edge] * 4, cv2.BORDER_REPLICATE)
+    return replace(
+        layer,
+        rgb=blur(layer.rgb, sigma_px),
+        opacity=blur(layer.opacity, sigma_px),
+        open=blur(opened, sigma_px)[edge:-edge, edge:-edge],
+    )
+
+
+def composite(linear: np.ndarray, layer: Layer, rim_px: float) -> np.ndarray:
+    """A copy of a picture (h, w, 3), linear, with the layer painted over it.
+
+    Pixels without skin (mouth opening, teeth, background) keep their colour, except within `rim_px`
+    of the painted lips, where the lens mixed the tattoo into them: there the colour of the pure
+    pixels behind is continued.
+    """
+    result = np.array(linear, dtype=np.float32)
+    patch = result[layer.window.slices]
+    behind = _behind(patch, layer, rim_px)
+    opened = np.minimum(layer.open, 1.0 - layer.opacity)[..., None]
+    bare = np.clip(1.0 - layer.opacity[..., None] - opened, 0.0, 1.0)
+    result[layer.window.slices] = layer.rgb + bare * patch + opened * behind
+    return result
+
+
+def _behind(patch: np.ndarray, layer: Layer, rim_px: float) -> np.ndarray:
+    """The colour of what lies behind the lips, (h, w, 3), as if the lips had not blurred into it."""
+    painted = layer.opacity > 0.02
+    if not painted.any():
+        return patch
+    distance = cv2.distanceTransform((~painted).astype(np.uint8), cv2.DIST_L2, 5)
+    t = np.clip(distance / max(rim_px, 1e-6), 0.0, 1.0)
+    # Where the opening is narrow no pixel is pure; the least mixed ones count most.
+    purity = layer.open * (t**3 + 1e-4)
+    continued, support = weighted_blur(patch, purity, max(rim_px, 0.5))
+    smooth = (t * t * (3.0 - 2.0 * t))[..., None]
+    mixed = smooth * patch + (1.0 - smooth) * continued
+    return np.where((support > 1e-9)[..., None] & (layer.open > 0)[..., None], mixed, patch)

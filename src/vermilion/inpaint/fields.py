@@ -1,0 +1,81 @@
+"""Fields over a texture: sampling, low-pass with holes, filling of holes."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+#: Luminance of linear RGB (ITU-R BT.709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
+
+def sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Bilinear values of an image (h, w[, c]) at points (..., 2), centres at half numbers.
+
+    Float32 (..., [c]); the border is repeated.
+    """
+    flat = np.ascontiguousarray(points, dtype=np.float32).reshape(-1, 2) - np.float32(0.5)
+    flat = np.nan_to_num(flat, nan=-1.0)
+    # cv2.remap takes no more than 32767 rows or columns: work in rows of 1024.
+    n_rows = max(1, -(-len(flat) // 1024))
+    padded = np.zeros((n_rows * 1024, 2), dtype=np.float32)
+    padded[: len(flat)] = flat
+    grid = padded.reshape(n_rows, 1024, 2)
+    values = cv2.remap(
+        np.ascontiguousarray(image, dtype=np.float32),
+        np.ascontiguousarray(grid[..., 0]),
+        np.ascontiguousarray(grid[..., 1]),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    values = values.reshape(n_rows * 1024, *image.shape[2:])[: len(flat)]
+    return values.reshape(*points.shape[:-1], *image.shape[2:])
+
+
+def blur(values: np.ndarray, sigma: float) -> np.ndarray:
+    """Gaussian of (h, w[, c]) with zeros outside; `sigma` in texels or pixels."""
+    if sigma <= 0:
+        return np.asarray(values, dtype=np.float32)
+    return cv2.GaussianBlur(
+        np.asarray(values, dtype=np.float32), (0, 0), sigma, borderType=cv2.BORDER_CONSTANT
+    )
+
+
+def weighted_blur(
+    values: np.ndarray, weights: np.ndarray, sigma: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Low-pass of `values` (h, w[, c]) that ignores texels of weight 0 (normalised convolution).
+
+    Returns:
+        (means (h, w[, c]), support (h, w) in [0, 1]); zero where nothing supports the mean.
+    """
+    weights = np.asarray(weights, dtype=np.float32)
+    expand = (slice(None), slice(None)) + (None,) * (np.ndim(values) - 2)
+    support = blur(weights, sigma)
+    total = blur(np.where(weights[expand] > 0, values, 0) * weights[expand], sigma)
+    return total / np.maximum(support, 1e-6)[expand], support
+
+
+def fill_holes(values: np.ndarray, known: np.ndarray, sigma: float = 1.5) -> np.ndarray:
+    """Values (h, w[, c]) continued smoothly from where they are `known` (h, w) to everywhere.
+
+    Each round widens the Gaussian twofold and fills what it reaches, so that near holes are filled
+    from near by.
+    """
+    if not known.any():
+        return np.zeros_like(values, dtype=np.float32)
+    filled = np.where(known[(...,) + (None,) * (np.ndim(values) - 2)], values, 0)
+    filled = filled.astype(np.float32)
+    missing = ~known
+    while missing.any():
+        means, support = weighted_blur(values, known.astype(np.float32), sigma)
+        reached = missing & (support > 1e-3)
+        filled[reached] = means[reached]
+        missing &= ~reached
+        sigma *= 2.0
+    return filled
+
+
+def luminance(linear: np.ndarray) -> np.ndarray:
+    """Luminance of linear RGB (..., 3)."""
+    return np.asarray(linear, dtype=np.float32) @ LUMINANCE
