@@ -1,0 +1,101 @@
+"""Quadratic problems over all frames of a take with a box on every unknown.
+
+The unknowns are x (F, P): P numbers a frame. The matrix is block diagonal (one block a frame) plus
+smoothness over time that couples each parameter with itself in the next two frames; stored as a
+band, so that a whole take is solved at once, exactly, and no result depends on chunks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+
+class BandMatrix:
+    """A symmetric matrix in LAPACK's upper banded storage, bandwidth 2 P.
+
+    Args:
+        blocks: (F, P, P) symmetric blocks on the diagonal.
+        second, first: (F - 2, P) and (F - 1, P) weights of squared second and first differences.
+    """
+
+    def __init__(self, blocks: np.ndarray, second: np.ndarray, first: np.ndarray):
+        self.n_frames, self.n_params = blocks.shape[:2]
+        n, p = self.n_frames, self.n_params
+        self.u = 2 * p if n > 2 else (p if n == 2 else p - 1)
+        self.band = np.zeros((self.u + 1, n * p))
+        rows, columns = np.triu_indices(p)
+        at = np.arange(n)[:, None] * p + columns
+        self.band[self.u + rows - columns, at] = blocks[:, rows, columns]
+        if n > 1:
+            self._add_differences(first, (-1.0, 1.0))
+        if n > 2:
+            self._add_differences(second, (1.0, -2.0, 1.0))
+
+    def _add_differences(self, weights: np.ndarray, stencil: tuple[float, ...]) -> None:
+        """Add sum_f weights[f] (stencil . x[f:])^2 for each parameter."""
+        p = self.n_params
+        count = len(weights)
+        for i, a in enumerate(stencil):
+            for j, b in enumerate(stencil[i:], start=i):
+                columns = ((np.arange(count) + j)[:, None] * p + np.arange(p)).reshape(-1)
+                self.band[self.u - (j - i) * p, columns] += (a * b * weights).reshape(-1)
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Product with x (F, P)."""
+        flat = x.reshape(-1)
+        result = self.band[self.u] * flat
+        for offset in range(1, self.u + 1):
+            diagonal = self.band[self.u - offset, offset:]
+            result[:-offset] += diagonal * flat[offset:]
+            result[offset:] += diagonal * flat[:-offset]
+        return result.reshape(x.shape)
+
+    def solve_free(self, right: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Solve for the free unknowns (F, P) bool with the others held at zero."""
+        band, fixed = self.band.copy(), ~free.reshape(-1)
+        for offset in range(1, self.u + 1):
+            row = band[self.u - offset, offset:]
+            row[fixed[offset:] | fixed[:-offset]] = 0.0
+        band[self.u, fixed] = 1.0
+        flat = np.where(fixed, 0.0, right.reshape(-1))
+        solution = solveh_banded(band, flat, overwrite_ab=True, check_finite=False)
+        return solution.reshape(right.shape)
+
+
+def solve_in_box(
+    matrix: BandMatrix,
+    right: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    start: np.ndarray | None = None,
+    iterations: int = 30,
+) -> np.ndarray:
+    """Minimise x'Ax/2 - b'x with lower <= x <= upper, by projected Newton (Bertsekas 1982).
+
+    Args:
+        matrix: A, positive definite.
+        right: b, (F, P).
+        lower, upper: (P,) or (F, P), may be infinite.
+        start: a feasible first guess (F, P).
+
+    Returns:
+        x (F, P), within the box.
+    """
+    lower, upper = np.broadcast_to(lower, right.shape), np.broadcast_to(upper, right.shape)
+    x = np.clip(np.zeros_like(right) if start is None else start, lower, upper)
+    gradient = matrix.times(x) - right
+    for _ in range(iterations):
+        held = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
+        step = matrix.solve_free(-gradient, ~held)
+        moved = False
+        for scale in (1.0, 0.5, 0.25, 0.1, 0.01):
+            trial = np.clip(x + scale * step, lower, upper)
+            change = trial - x
+            product = matrix.times(change)
+            if (gradient * change).sum() + 0.5 * (change * product).sum() < 0:
+                x, gradient, moved = trial, gradient + product, True
+                break
+        if not moved or np.abs(change).max() < 1e-10:
+            break
+    return x
