@@ -10,14 +10,8 @@ from vermilion.config.base import StageConfig
 
 
 class ReferenceConfig(StageConfig):
-    """What results are compared with."""
+    """How a vertex finds its counterpart in the truth."""
 
-    truth: str | None = Field(
-        None,
-        description="Folder of known truth, `<subject>/<take>/vertices_mm.npy` and `triangles.npy` "
-        "inside; read by the evaluation alone. Empty: the studio's truth for the takes that the "
-        "studio made, and the held-out reconstruction H for the others.",
-    )
     max_distance_mm: float = Field(
         6.0,
         gt=0.0,
@@ -91,8 +85,14 @@ class FiguresConfig(StageConfig):
 class EvaluationConfig(StageConfig):
     """Errors against truth or a held-out reconstruction (Lips16 section 6)."""
 
+    truth: str | None = Field(
+        None,
+        description="Folder of known truth, `<subject>/<take>/vertices_mm.npy` and `triangles.npy` "
+        "inside; read by the evaluation alone. Empty: the studio's truth for the takes that the "
+        "studio made, and the held-out reconstruction H for the others.",
+    )
     reference: ReferenceConfig = Field(
-        default_factory=ReferenceConfig, description="What results are compared with."
+        default_factory=ReferenceConfig, description="How a vertex finds its counterpart."
     )
     variants: list[Literal["affine", "shape-only", "distances-only"]] = Field(
         [],

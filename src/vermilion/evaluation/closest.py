@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numba
@@ -10,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from vermilion.mesh import triangle_areas, triangle_normals
 
-_FIRST_CANDIDATES = 12
+_FIRST_CANDIDATES = 8
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,9 @@ class Surface:
         best = np.full(len(points), np.inf)
         triangle = np.full(len(points), -1, np.int64)
         barycentric = np.zeros((len(points), 3))
+        first = _FIRST_CANDIDATES
         for members, tree, radius in self._groups:
-            todo, k = np.arange(len(points)), 96 if conditional else _FIRST_CANDIDATES
+            todo, k = np.arange(len(points)), 96 if conditional else first
             while len(todo):
                 k = min(k, len(members))
                 far, near = tree.query(points[todo], k=k)
@@ -100,7 +102,8 @@ class Surface:
                 if conditional or k == len(members):
                     break
                 todo = todo[far < best[todo] + radius]
-                k *= 4
+                k *= 3
+            first = 1
         triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
         return SurfacePoints(triangle, barycentric, best)
 
@@ -113,38 +116,47 @@ def _closest_of(  # pragma: no cover - compiled
     """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
     for index in range(len(rows)):
         row = rows[index]
-        p = points[row]
+        px, py, pz = points[row]
+        nx, ny, nz = normals[row]
+        least = best[row] ** 2
         for t in candidates[index]:
             if labels[row] != 0 and face_labels[t] != 0 and labels[row] != face_labels[t]:
                 continue
-            if min_cosine > -1.0 and np.dot(normals[row], face_normals[t]) < min_cosine:
-                continue
-            u, v, w = _project(p, corners[t, 0], corners[t, 1], corners[t, 2])
-            q = u * corners[t, 0] + v * corners[t, 1] + w * corners[t, 2]
-            distance = np.sqrt(((p - q) ** 2).sum())
-            if distance < best[row]:
-                best[row] = distance
+            if min_cosine > -1.0:
+                fx, fy, fz = face_normals[t]
+                if nx * fx + ny * fy + nz * fz < min_cosine:
+                    continue
+            u, v, w = _project(px, py, pz, corners[t])
+            dx = u * corners[t, 0, 0] + v * corners[t, 1, 0] + w * corners[t, 2, 0] - px
+            dy = u * corners[t, 0, 1] + v * corners[t, 1, 1] + w * corners[t, 2, 1] - py
+            dz = u * corners[t, 0, 2] + v * corners[t, 1, 2] + w * corners[t, 2, 2] - pz
+            square = dx * dx + dy * dy + dz * dz
+            if square < least:
+                least = square
+                best[row] = math.sqrt(square)
                 triangle[row] = t
                 barycentric[row, 0], barycentric[row, 1], barycentric[row, 2] = u, v, w
 
 
-@numba.njit(cache=True)
-def _project(p, a, b, c):  # pragma: no cover - compiled
+@numba.njit(cache=True, inline="always")
+def _project(px, py, pz, abc):  # pragma: no cover - compiled
     """Barycentric weights of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
-    ab, ac, ap = b - a, c - a, p - a
-    d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
+    abx, aby, abz = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
+    acx, acy, acz = abc[2, 0] - abc[0, 0], abc[2, 1] - abc[0, 1], abc[2, 2] - abc[0, 2]
+    apx, apy, apz = px - abc[0, 0], py - abc[0, 1], pz - abc[0, 2]
+    d1, d2 = abx * apx + aby * apy + abz * apz, acx * apx + acy * apy + acz * apz
     if d1 <= 0 and d2 <= 0:
         return 1.0, 0.0, 0.0
-    bp = p - b
-    d3, d4 = np.dot(ab, bp), np.dot(ac, bp)
+    bpx, bpy, bpz = px - abc[1, 0], py - abc[1, 1], pz - abc[1, 2]
+    d3, d4 = abx * bpx + aby * bpy + abz * bpz, acx * bpx + acy * bpy + acz * bpz
     if d3 >= 0 and d4 <= d3:
         return 0.0, 1.0, 0.0
     vc = d1 * d4 - d3 * d2
     if vc <= 0 and d1 >= 0 and d3 <= 0:
         v = d1 / (d1 - d3)
         return 1.0 - v, v, 0.0
-    cp = p - c
-    d5, d6 = np.dot(ab, cp), np.dot(ac, cp)
+    cpx, cpy, cpz = px - abc[2, 0], py - abc[2, 1], pz - abc[2, 2]
+    d5, d6 = abx * cpx + aby * cpy + abz * cpz, acx * cpx + acy * cpy + acz * cpz
     if d6 >= 0 and d5 <= d6:
         return 0.0, 0.0, 1.0
     vb = d5 * d2 - d1 * d6

@@ -1,0 +1,24 @@
+"""OBJ files, one a frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.files import atomic_path
+
+
+def write_obj(
+    path: str | Path, vertices_mm: np.ndarray, triangles: np.ndarray, uv: np.ndarray | None = None
+) -> None:
+    """Write (V, 3) mm and (T, 3) as OBJ, millimetres, with (V, 2) texture coordinates if given."""
+    with atomic_path(path) as temporary, open(temporary, "w") as stream:
+        stream.write("# millimetres\n")
+        np.savetxt(stream, vertices_mm, "v %.4f %.4f %.4f")
+        ids = np.asarray(triangles) + 1
+        if uv is None:
+            np.savetxt(stream, ids, "f %d %d %d")
+            return
+        np.savetxt(stream, uv, "vt %.5f %.5f")
+        np.savetxt(stream, np.repeat(ids, 2, axis=1), "f %d/%d %d/%d %d/%d")

@@ -1,0 +1,202 @@
+"""The overlay video: original, base track and corrected mesh side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.draw import label
+from vermilion.files import atomic_path
+from vermilion.mesh import vertex_normals
+from vermilion.raycast import RayCaster, interpolate
+
+SKIN = (0.80, 0.79, 0.77)
+LIPS = (0.86, 0.53, 0.50)
+
+
+@dataclass(frozen=True)
+class Crop:
+    """The part of a picture that the panels show: x, y of its corner, its size, and its scale."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    scale: float
+
+    def of_picture(self, picture: np.ndarray) -> np.ndarray:
+        """The part of (h, w, 3) uint8, scaled; grey beyond the picture's border."""
+        height, width = picture.shape[:2]
+        result = np.full((self.height, self.width, 3), 60, dtype=np.uint8)
+        x0, y0 = max(self.left, 0), max(self.top, 0)
+        x1, y1 = min(self.left + self.width, width), min(self.top + self.height, height)
+        if x1 > x0 and y1 > y0:
+            part = picture[y0:y1, x0:x1]
+            result[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left] = part
+        method = cv2.INTER_AREA if self.scale < 1 else cv2.INTER_CUBIC
+        return cv2.resize(result, self.size, interpolation=method)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of a panel, even numbers."""
+        return (
+            2 * max(1, round(self.width * self.scale / 2)),
+            2 * max(1, round(self.height * self.scale / 2)),
+        )
+
+    def of_camera(self, camera: Camera) -> Camera:
+        """The camera whose whole picture is this part."""
+        model = camera.colmap()
+        params = np.array(camera.params, dtype=float)
+        params[list(model.principal_point_idxs())] -= (self.left, self.top)
+        cropped = replace(
+            camera, params=tuple(params), width_px=self.width, height_px=self.height
+        ).colmap()
+        cropped.rescale(*self.size)
+        return replace(
+            camera,
+            params=tuple(cropped.params),
+            width_px=cropped.width,
+            height_px=cropped.height,
+        )
+
+
+def crop_round(
+    points_px: np.ndarray, picture_px: tuple[int, int], margin: float, height_px: int
+) -> Crop:
+    """The crop round all of (..., 2) projected points, within the picture, `height_px` high when shown.
+
+    NaN points do not count. Half a per cent of points on each side may lie outside. `margin` is a
+    share of the points' extent; `picture_px` is (width, height).
+    """
+    low, high = _extent(points_px, picture_px)
+    pad = margin / 2 * (high - low)
+    low = np.clip(np.floor(low - pad), 0, np.array(picture_px) - 8).astype(int)
+    high = np.clip(np.ceil(high + pad), low + 8, picture_px).astype(int)
+    width, height = (int(size) for size in high - low)
+    return Crop(int(low[0]), int(low[1]), width, height, height_px / height)
+
+
+def strip_round(
+    points_px: np.ndarray, picture_px: tuple[int, int], margin: float, size_px: tuple[int, int]
+) -> Crop:
+    """The crop round the points that fills a panel of `size_px` (width, height) when shown."""
+    low, high = _extent(points_px, picture_px)
+    centre, extent = (low + high) / 2, (1 + margin) * (high - low)
+    scale = float(min(size_px[0] / extent[0], size_px[1] / extent[1]))
+    width, height = round(size_px[0] / scale), round(size_px[1] / scale)
+    left, top = np.rint(centre - [width / 2, height / 2]).astype(int)
+    return Crop(int(left), int(top), width, height, scale)
+
+
+def _extent(points_px, picture_px):
+    points = points_px.reshape(-1, 2)
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) == 0:
+        return np.zeros(2), np.array(picture_px, dtype=float)
+    return np.quantile(points, 0.005, axis=0), np.quantile(points, 0.995, axis=0)
+
+
+def lip_colours(n_vertices: int, vermilion: np.ndarray) -> np.ndarray:
+    """(V, 3) colours in [0, 1]: light skin, lips slightly red; `vermilion` (V,) bool."""
+    colours = np.tile(SKIN, (n_vertices, 1))
+    colours[vermilion] = LIPS
+    return colours
+
+
+def shade(
+    picture: np.ndarray,
+    camera: Camera,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    colours: np.ndarray,
+    opacity: float,
+) -> np.ndarray:
+    """A shaded mesh over (h, w, 3) uint8: headlight from the upper left, a soft sheen, dark rims."""
+    hits = RayCaster(vertices_mm, triangles).see(camera)
+    inside = hits.hit
+    if not inside.any():
+        return picture
+    normals = interpolate(hits, triangles, vertex_normals(vertices_mm, triangles))[inside]
+    albedo = interpolate(hits, triangles, colours)[inside]
+    local = normals @ camera.rotation.T
+    towards = -camera.rays(camera.pixel_grid())[1][inside] @ camera.rotation.T
+    back = (local * towards).sum(axis=1) < 0
+    local[back] *= -1
+    light = np.array([-0.35, -0.45, -0.82]) / np.linalg.norm([-0.35, -0.45, -0.82])
+    diffuse = np.clip(local @ light, 0, 1)
+    half = light + towards
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    sheen = 0.18 * np.clip((local * half).sum(axis=1), 0, 1) ** 25
+    value = albedo * (0.22 + 0.78 * diffuse)[:, None] + sheen[:, None]
+    value[back] *= 0.35
+    result = picture.copy()
+    mixed = picture[inside] * (1 - opacity) + 255 * np.clip(value, 0, 1) ** (1 / 1.3) * opacity
+    result[inside] = np.rint(np.clip(mixed, 0, 255)).astype(np.uint8)
+    return result
+
+
+def overlay_picture(
+    picture: np.ndarray,
+    camera: Camera,
+    crops: Sequence[Crop],
+    meshes: Sequence[tuple[str, np.ndarray | None]],
+    triangles: np.ndarray,
+    colours: np.ndarray,
+    opacity: float,
+    caption: str,
+) -> np.ndarray:
+    """One frame of the video: a column for the original and one a mesh, a row a crop.
+
+    Args:
+        picture: (h, w, 3) uint8 sRGB, the whole frame.
+        crops: of one panel width; the first row carries the labels.
+        meshes: (label, (V, 3) world mm) pairs; None where the frame has no mesh.
+        colours: (V, 3) in [0, 1].
+        caption: written into the first panel (take, frame).
+    """
+    rows = []
+    for crop in crops:
+        original, near = crop.of_picture(picture), crop.of_camera(camera)
+        panels, names = [original], [caption]
+        for name, vertices in meshes:
+            tracked = vertices is not None and np.isfinite(vertices).all()
+            names.append(name if tracked else f"{name}: not tracked")
+            if tracked:
+                points = np.asarray(vertices, dtype=float)
+                panels.append(shade(original, near, points, triangles, colours, opacity))
+            else:
+                panels.append(original // 2)
+        if not rows:
+            panels = [label(*pair) for pair in zip(panels, names, strict=True)]
+        rows.append(np.hstack(panels))
+    width = min(row.shape[1] for row in rows)
+    return np.vstack([row[:, :width] for row in rows])
+
+
+def join_videos(path: str | Path, parts: Sequence[str | Path]) -> None:
+    """Put H.264 files of one size and frame rate after one another without encoding again."""
+    with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as target:
+        stream, offset = None, 0
+        for part in parts:
+            with av.open(str(part)) as source:
+                given = source.streams.video[0]
+                if stream is None:
+                    stream = target.add_stream_from_template(given)
+                    stream.time_base = given.time_base
+                end = 0
+                for packet in source.demux(given):
+                    if packet.dts is None:
+                        continue
+                    packet.pts += offset
+                    packet.dts += offset
+                    packet.stream = stream
+                    end = max(end, packet.pts + (packet.duration or 0))
+                    target.mux(packet)
+                offset = end
