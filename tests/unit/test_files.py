@@ -1,0 +1,88 @@
+"""Whole files or none; tables, sequences and quality rows round-trip."""
+
+import numpy as np
+import pytest
+
+from vermilion.errors import InputError
+from vermilion.files import atomic_folder, atomic_path
+from vermilion.mesh import Mesh
+from vermilion.quality import QualityRow, flagged_frames, write_quality
+from vermilion.sequences import read_mesh, read_sequence, write_ply, write_sequence
+from vermilion.tables import read_table, write_table
+
+
+def test_failing_writer_leaves_nothing(tmp_path):
+    with pytest.raises(RuntimeError), atomic_path(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failing_writer_leaves_the_old_file(tmp_path):
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(RuntimeError), atomic_path(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_folder_is_replaced_as_a_whole(tmp_path):
+    (tmp_path / "f").mkdir()
+    (tmp_path / "f" / "old").touch()
+    with atomic_folder(tmp_path / "f") as temporary:
+        (temporary / "new").touch()
+    assert [p.name for p in (tmp_path / "f").iterdir()] == ["new"]
+    with pytest.raises(RuntimeError), atomic_folder(tmp_path / "f"):
+        raise RuntimeError
+    assert [p.name for p in tmp_path.iterdir()] == ["f"]
+
+
+def test_sequences_join_by_reading(tmp_path):
+    frames = np.random.default_rng(0).normal(size=(5, 4, 3)).astype(np.float32)
+    write_sequence(tmp_path / "a.npy", frames[:2])
+    write_sequence(tmp_path / "b.npy", frames[2:])
+    assert np.array_equal(read_sequence([tmp_path / "a.npy", tmp_path / "b.npy"]), frames)
+
+
+def test_truncated_sequence_is_named(tmp_path):
+    write_sequence(tmp_path / "a.npy", np.zeros((5, 4, 3)))
+    data = (tmp_path / "a.npy").read_bytes()
+    (tmp_path / "a.npy").write_bytes(data[:150])
+    with pytest.raises(InputError, match=r"a\.npy.*unreadable mesh sequence"):
+        read_sequence(tmp_path / "a.npy")
+
+
+def test_ply_keeps_vertices_and_order(tmp_path):
+    mesh = Mesh(np.random.default_rng(0).normal(size=(7, 3)), np.array([[0, 1, 2], [4, 3, 6]]))
+    write_ply(tmp_path / "m.ply", mesh)
+    back = read_mesh(tmp_path / "m.ply")
+    assert np.allclose(back.vertices_mm, mesh.vertices_mm, atol=1e-6)
+    assert np.array_equal(back.triangles, mesh.triangles)
+
+
+def test_table_names_its_missing_column(tmp_path):
+    write_table(tmp_path / "t.tsv", [{"a_mm": 1.25}])
+    assert read_table(tmp_path / "t.tsv")["a_mm"][0] == 1.25
+    with pytest.raises(InputError, match="b_px"):
+        read_table(tmp_path / "t.tsv", ["b_px"])
+
+
+def test_flagged_frames_carry_their_reason(tmp_path):
+    rows = [QualityRow(0, figures={"error_px": 1.0}), QualityRow(1, False, "no face found")]
+    write_quality(tmp_path / "q.tsv", "anna", "rom", "landmarks", rows)
+    flagged = flagged_frames([tmp_path / "q.tsv"])
+    assert flagged.to_dict("records") == [
+        {
+            "subject": "anna",
+            "take": "rom",
+            "stage": "landmarks",
+            "frame": 1,
+            "valid": 0,
+            "reason": "no face found",
+        }
+    ]
+
+
+def test_invalid_row_needs_a_reason(tmp_path):
+    with pytest.raises(ValueError, match="needs a reason"):
+        write_quality(tmp_path / "q.tsv", "s", "t", "x", [QualityRow(0, False)])

@@ -1,0 +1,102 @@
+"""Pictures and frames: linear light, exact frames, errors that name the place."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vermilion.errors import InputError
+from vermilion.frames import list_frames, open_frames
+from vermilion.images import (
+    image_size,
+    linear_to_srgb,
+    read_channels,
+    read_image,
+    srgb_to_linear,
+    write_channels,
+    write_image,
+    write_srgb8,
+)
+from vermilion.video import VideoReader, write_video
+
+
+@given(st.floats(0, 1))
+def test_srgb_is_inverted(value):
+    assert abs(float(linear_to_srgb(srgb_to_linear(value))) - value) < 1e-5
+
+
+def test_mid_grey_is_darker_in_linear_light():
+    assert np.isclose(float(srgb_to_linear(0.5)), 0.21404, atol=1e-4)
+
+
+@pytest.mark.parametrize(("suffix", "step"), [(".png", 1 / 255), (".exr", 1e-3)])
+def test_image_round_trip(tmp_path, suffix, step):
+    linear = np.random.default_rng(0).uniform(0, 1, (17, 23, 3)).astype(np.float32)
+    path = tmp_path / f"picture{suffix}"
+    write_image(path, linear)
+    assert image_size(path) == (23, 17)
+    assert np.abs(linear_to_srgb(read_image(path)) - linear_to_srgb(linear)).max() <= step
+
+
+def test_channels_keep_their_names(tmp_path):
+    inner = np.linspace(0, 1, 12, dtype=np.float32).reshape(3, 4)
+    write_channels(tmp_path / "map.exr", {"inner": inner, "outer": 1 - inner})
+    back = read_channels(tmp_path / "map.exr")
+    assert set(back) == {"inner", "outer"}
+    assert np.abs(back["inner"] - inner).max() < 1e-3
+
+
+def test_same_picture_gives_the_same_bytes(tmp_path):
+    linear = np.random.default_rng(0).uniform(0, 1, (16, 16, 3))
+    for name in ("a", "b"):
+        write_image(tmp_path / f"{name}.png", linear)
+        write_image(tmp_path / f"{name}.exr", linear)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+def test_truncated_image_is_named(tmp_path):
+    path = tmp_path / "frames" / "face2" / "000004.png"
+    path.parent.mkdir(parents=True)
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)
+    write_srgb8(path, noise)
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(InputError) as error:
+        open_frames(tmp_path, "anna", "rom").read("face2", 4)
+    for fact in ("subject anna", "take rom", "camera face2", "frame 4", "000004.png", "truncated"):
+        assert fact in str(error.value)
+
+
+def test_missing_frame_and_camera_are_named(tmp_path):
+    write_srgb8(tmp_path / "frames" / "a" / "000001.png", np.zeros((4, 4, 3), np.uint8))
+    frames = open_frames(tmp_path, "anna", "rom")
+    with pytest.raises(InputError, match=r"frame 2.*no image of this frame"):
+        frames.read("a", 2)
+    with pytest.raises(InputError, match=r"camera b.*no such folder"):
+        frames.read("b", 1)
+
+
+def test_numbers_of_frames_are_read_from_usual_names(tmp_path):
+    for name in ("shot_0012.png", "000013.jpg", "plate.14.exr", "notes.txt", ".tmp15.png"):
+        (tmp_path / name).touch()
+    assert list(list_frames(tmp_path)) == [12, 13, 14]
+
+
+def test_every_frame_of_a_video_is_the_right_one(tmp_path):
+    def picture(i):
+        return np.full((48, 64, 3), 10 * i + 20, dtype=np.uint8)
+
+    write_video(tmp_path / "clip.mp4", [picture(i) for i in range(20)], fps=25)
+    reader = VideoReader(tmp_path / "clip.mp4")
+    assert (reader.n_frames, reader.size, reader.fps) == (20, (64, 48), 25.0)
+    for i in (7, 3, 19, 0, 4, 5, 18):  # forth and back
+        assert abs(float(reader.read(i).mean()) - (10 * i + 20)) < 4
+    with pytest.raises(InputError, match="a video of 20 frames"):
+        reader.read(20)
+
+
+def test_file_that_is_no_video_is_named(tmp_path):
+    path = tmp_path / "clip.mp4"
+    path.write_bytes(b"not a video")
+    with pytest.raises(InputError, match=r"clip\.mp4.*unreadable video"):
+        VideoReader(path)
