@@ -62,6 +62,12 @@ class RayCaster:
         self, origins_mm: np.ndarray, directions: np.ndarray, limit_mm: float = np.inf
     ) -> np.ndarray:
         """Whether anything lies within `limit_mm` along each ray, (...,) bool."""
+        if not np.isfinite(limit_mm):  # any hit serves, which is twice as quick
+            shape = directions.shape[:-1]
+            origins = np.broadcast_to(origins_mm, directions.shape).reshape(-1, 3)
+            flat = np.ascontiguousarray(directions.reshape(-1, 3), dtype=np.float32)
+            origins = np.ascontiguousarray(origins, dtype=np.float32)
+            return (self._scene.run(origins, flat, query="OCCLUDED") >= 0).reshape(shape)
         return self.cast(origins_mm, directions).distance_mm < limit_mm
 
     def see(self, camera: Camera) -> Hits:

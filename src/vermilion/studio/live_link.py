@@ -1,0 +1,83 @@
+"""Expression curves recorded by Live Link Face: a CSV of ARKit weights, a row a frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vermilion.errors import InputError
+
+#: ARKit shapes without a side that models may split in two.
+SPLIT = ("browInnerUp", "cheekPuff")
+
+
+def arkit_name(column: str) -> str:
+    """`EyeBlinkLeft` -> `eyeBlink_L`; names without a side only change their first letter.
+
+    `mouthLeft`, `mouthRight`, `jawLeft` and `jawRight` name a direction, not a side.
+    """
+    name = column[0].lower() + column[1:]
+    if name in ("mouthLeft", "mouthRight", "jawLeft", "jawRight"):
+        return name
+    for side, suffix in (("Left", "_L"), ("Right", "_R")):
+        if name.endswith(side):
+            return name[: -len(side)] + suffix
+    return name
+
+
+def read_live_link(
+    path: str | Path,
+    names: tuple[str, ...],
+    n_frames: int,
+    fps: float,
+    csv_first: int = 0,
+    csv_fps: float = 30.0,
+) -> np.ndarray:
+    """Weights (n_frames, K) of the model's expressions `names`, resampled to `fps`.
+
+    Rows from `csv_first` on are used; an expression that the file lacks stays 0. Raises InputError
+    where the file is no such table or has too few rows.
+    """
+    try:
+        table = pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"an unreadable table ({error})",
+            "a Live Link Face CSV",
+            "Check `studio.subjects...takes...csv`.",
+            path=path,
+        ) from error
+    columns = {
+        arkit_name(column): table[column] for column in table.columns if column[:1].isalpha()
+    }
+    for whole in SPLIT:
+        if whole in columns:
+            for suffix in ("_L", "_R"):
+                columns.setdefault(whole + suffix, columns[whole])
+    if OPENING_COLUMN not in columns:
+        raise InputError(
+            f"columns {list(table.columns)[:6]}...",
+            "ARKit weights (JawOpen, MouthPucker, ...)",
+            "Export the take from Live Link Face as CSV.",
+            path=path,
+        )
+    rows = csv_first + np.arange(n_frames) * (csv_fps / fps)
+    if len(rows) and rows[-1] > len(table) - 1:
+        raise InputError(
+            f"{len(table)} rows",
+            f"at least {int(np.ceil(rows[-1])) + 1} (from row {csv_first}, {n_frames} frames)",
+            "Take fewer frames or an earlier first row.",
+            path=path,
+        )
+    weights = np.zeros((n_frames, len(names)))
+    index = np.arange(len(table))
+    for k, name in enumerate(names):
+        if name in columns:
+            values = pd.to_numeric(columns[name], errors="coerce").fillna(0.0).to_numpy()
+            weights[:, k] = np.interp(rows, index, values)
+    return np.clip(weights, 0.0, 1.0)
+
+
+OPENING_COLUMN = "jawOpen"

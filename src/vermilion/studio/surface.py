@@ -1,0 +1,136 @@
+"""What the texture needs to know of every vertex and triangle of a studio model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from vermilion.faces.contours import (
+    LEFT_CORNER,
+    RIGHT_CORNER,
+    edge_graph,
+    enclosed,
+    geodesic_distance,
+    lip_sides,
+)
+from vermilion.faces.model import FaceModel
+from vermilion.mesh import adjacency, unique_edges
+
+SKIN, MOUTH, TEETH, EYE = range(4)
+
+#: Smoothing steps of the vermilion border's distance, against stairs along the mesh's edges.
+BORDER_SMOOTHING = 3
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Coordinates of the solid texture, one per vertex of the studio model.
+
+    Attributes:
+        solid_mm: (V, 3) float32 place in the model's neutral; of an eyeball, from its own centre.
+        lip_mm: (V,) float32 distance from the vermilion border, positive on the red side.
+        inside_mm: (V,) float32 distance past the line where the lips meet, positive inside.
+        upper: (V,) bool, nearer to the upper lip than to the lower.
+        material: (T,) uint8 of SKIN, MOUTH (gums, tongue), TEETH, EYE.
+        brows_mm: (2, 5, 2) float32 x and y of both brows in the neutral.
+        chin_mm: height of the chin in the neutral.
+    """
+
+    solid_mm: np.ndarray
+    lip_mm: np.ndarray
+    inside_mm: np.ndarray
+    upper: np.ndarray
+    material: np.ndarray
+    brows_mm: np.ndarray
+    chin_mm: float
+
+
+def surface_of(model: FaceModel) -> Surface:
+    """Texture coordinates of a studio model; a few seconds at most, once a take."""
+    skin, label = _skin_part(model)
+    graph = edge_graph(model.neutral_mm, skin)
+    lip = _lip_distance(model, skin, graph)
+    inside = _inside_distance(model, skin, graph)
+    corners = (model.landmarks[RIGHT_CORNER], model.landmarks[LEFT_CORNER])
+    upper = lip_sides(graph, model.outer_contour, model.inner_contour, corners)
+    brows = model.neutral_mm[model.landmarks[17:27], :2].reshape(2, 5, 2)
+    return Surface(
+        solid_mm=_solid(model, label).astype(np.float32),
+        lip_mm=lip.astype(np.float32),
+        inside_mm=inside.astype(np.float32),
+        upper=upper,
+        material=_materials(model, label),
+        brows_mm=brows.astype(np.float32),
+        chin_mm=float(model.neutral_mm[model.landmarks[8], 1]),
+    )
+
+
+def _skin_part(model: FaceModel) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles of the part that the landmarks lie on, and the part number of each vertex."""
+    edges = unique_edges(model.triangles)
+    n_vertices = model.n_vertices
+    graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n_vertices,) * 2)
+    _, label = csgraph.connected_components(graph, directed=False)
+    home = label[model.landmarks[8]]
+    label = np.where(label == home, -1, label)
+    return model.triangles[label[model.triangles[:, 0]] == -1], label
+
+
+def _lip_distance(model: FaceModel, skin: np.ndarray, graph: sparse.spmatrix) -> np.ndarray:
+    loop = model.neutral_mm[model.outer_contour]
+    distance = _distance_to_loop(model.neutral_mm, loop)
+    off_border = geodesic_distance(graph, model.outer_contour)[model.inner_contour]
+    seed = model.inner_contour[np.argmax(np.where(np.isfinite(off_border), off_border, -1))]
+    red = enclosed(skin, model.n_vertices, model.outer_contour, int(seed))
+    signed = np.where(red, distance, -distance)
+    signed[model.outer_contour] = 0.0
+    neighbours = adjacency(skin, model.n_vertices)
+    degree = np.maximum(np.asarray(neighbours.sum(axis=1)).ravel(), 1)
+    near = np.abs(signed) < 5.0
+    for _ in range(BORDER_SMOOTHING):
+        signed = np.where(near, 0.5 * signed + 0.5 * (neighbours @ signed) / degree, signed)
+    return signed
+
+
+def _inside_distance(model: FaceModel, skin: np.ndarray, graph: sparse.spmatrix) -> np.ndarray:
+    distance = geodesic_distance(graph, model.inner_contour)
+    apart = ~np.isfinite(distance)
+    mouth = model.regions["mouth_inner"] & ~apart
+    if not mouth.any():
+        raise ValueError("the studio model has no inside of the lips (region mouth_inner)")
+    deepest = int(np.argmax(np.where(mouth, distance, -1)))
+    past = enclosed(skin, model.n_vertices, model.inner_contour, deepest)
+    signed = np.where(past, distance, -distance)
+    return np.where(apart, 30.0, signed)
+
+
+def _distance_to_loop(points: np.ndarray, loop: np.ndarray, subdivision: int = 12) -> np.ndarray:
+    following = np.roll(loop, -1, axis=0)
+    fractions = np.arange(subdivision)[:, None, None] / subdivision
+    samples = (loop + fractions * (following - loop)).reshape(-1, 3)
+    return cKDTree(samples).query(points)[0]
+
+
+def _solid(model: FaceModel, label: np.ndarray) -> np.ndarray:
+    """Neutral positions; those of each eyeball from the middle of its bounding box."""
+    solid = model.neutral_mm.copy()
+    eyes = model.regions["eyes"]
+    for side in (-1, 1):  # both shells of an eye share one centre
+        eye = eyes & (np.sign(model.neutral_mm[:, 0]) == side)
+        if eye.any():
+            part = model.neutral_mm[eye]
+            solid[eye] -= 0.5 * (part.min(axis=0) + part.max(axis=0))
+    return solid
+
+
+def _materials(model: FaceModel, label: np.ndarray) -> np.ndarray:
+    first = model.triangles[:, 0]
+    material = np.full(len(model.triangles), SKIN, dtype=np.uint8)
+    material[model.regions["mouth_inner"][first] & (label[first] != -1)] = MOUTH
+    material[model.regions["teeth"][model.triangles].all(axis=1)] = TEETH
+    material[model.regions["eyes"][model.triangles].all(axis=1)] = EYE
+    return material
