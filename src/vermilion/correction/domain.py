@@ -1,0 +1,116 @@
+"""Which vertices the integration may move, and how strongly each is held.
+
+Four kinds of vertices:
+
+- *mask*: corners of the layer's triangles; free;
+- *followers*: parts that hang on the mask alone (the inside of the lips where the mask ends there);
+  free, and kept like the coarse mesh by a small weight, so that they go where the lips go;
+- *seam*: the ring round the mask, at most `seam_mm` along the surface; free, kept like the coarse
+  mesh, and held in place the more firmly the further out, so that the border shows no crease;
+- the rest of the face: fixed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from vermilion.mesh import adjacency, unique_edges
+
+#: How stiff a follower's triangle is beside one of the mask.
+FOLLOWER_WEIGHT = 0.05
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The part of a mesh that takes part in the integration.
+
+    Attributes:
+        free: (N,) vertex ids that may move, ascending.
+        kept: (K, 3) triangles outside the mask with a free corner: they stay as they are.
+        kept_weight: (K,) stiffness beside a mask triangle.
+        hold: (N,) how firmly each free vertex is held, as a share of its own stiffness.
+    """
+
+    free: np.ndarray
+    kept: np.ndarray
+    kept_weight: np.ndarray
+    hold: np.ndarray
+
+
+def integration_domain(
+    vertices_mm: np.ndarray, triangles: np.ndarray, mask: np.ndarray, seam_mm: float = 8.0
+) -> Domain:
+    """Find the free vertices round a mask.
+
+    Args:
+        vertices_mm: (V, 3) neutral.
+        triangles: (T, 3).
+        mask: (M,) ids of the layer's triangles.
+        seam_mm: width of the soft ring outside the mask; 0 fixes the mask's own border.
+    """
+    n_vertices = len(vertices_mm)
+    in_mask = np.zeros(n_vertices, dtype=bool)
+    in_mask[triangles[mask]] = True
+    followers = _followers(triangles, n_vertices, in_mask)
+    outside = ~(in_mask | followers)
+    if not outside[triangles].any():
+        raise ValueError("the mask covers the whole mesh: nothing is left to hold it in place")
+
+    if seam_mm > 0:
+        far = _distance_from(vertices_mm, triangles, in_mask | followers)
+        free = in_mask | followers | (far < seam_mm)
+        fraction = np.clip(np.where(np.isfinite(far), far, 0.0) / seam_mm, 0.0, 0.999)
+        hold = np.where(outside, fraction**2 / (1.0 - fraction) ** 2, 0.0)
+    else:
+        touches_outside = (adjacency(triangles, n_vertices) @ outside.astype(float)) > 0
+        on_border = touches_outside | _on_outer_border(triangles, mask, in_mask, followers)
+        free = (in_mask & ~on_border) | followers
+        hold = np.zeros(n_vertices)
+    others = np.setdiff1d(np.arange(len(triangles)), mask)
+    kept = others[free[triangles[others]].any(axis=1)]
+    weight = np.where(followers[triangles[kept]].any(axis=1), FOLLOWER_WEIGHT, 1.0)
+    ids = np.flatnonzero(free)
+    return Domain(ids, triangles[kept], weight, hold[ids])
+
+
+def _on_outer_border(
+    triangles: np.ndarray, mask: np.ndarray, in_mask: np.ndarray, followers: np.ndarray
+) -> np.ndarray:
+    """Mask vertices that also belong to a triangle outside the mask and its followers."""
+    others = np.setdiff1d(np.arange(len(triangles)), mask)
+    corners = triangles[others]
+    corners = corners[~followers[corners].any(axis=1)]
+    border = np.zeros(len(in_mask), dtype=bool)
+    border[corners] = True
+    return border & in_mask
+
+
+def _followers(triangles: np.ndarray, n_vertices: int, in_mask: np.ndarray) -> np.ndarray:
+    """Vertices whose connected part, the mask taken away, touches the mask and is not the face."""
+    edges = unique_edges(triangles)
+    outer = edges[~in_mask[edges].any(axis=1)]
+    graph = sparse.csr_matrix(
+        (np.ones(len(outer)), (outer[:, 0], outer[:, 1])), shape=(n_vertices, n_vertices)
+    )
+    _, part = csgraph.connected_components(graph, directed=False)
+    part = np.where(in_mask, -1, part)
+    sizes = np.bincount(part[part >= 0])
+    crossing = edges[in_mask[edges].sum(axis=1) == 1]
+    touched = np.unique(part[crossing][~in_mask[crossing]])
+    hanging = np.setdiff1d(touched, [int(np.argmax(sizes))])
+    # The largest part is the face; a large part of it cut off by the mask (a mask from ear to ear)
+    # is face as well.
+    hanging = hanging[sizes[hanging] < 0.25 * sizes.max()]
+    return np.isin(part, hanging)
+
+
+def _distance_from(vertices_mm: np.ndarray, triangles: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Distance along the edges to the nearest vertex of `start` (V,) bool, (V,) mm."""
+    edges = unique_edges(triangles)
+    lengths = np.linalg.norm(vertices_mm[edges[:, 0]] - vertices_mm[edges[:, 1]], axis=1)
+    graph = sparse.csr_matrix((lengths, (edges[:, 0], edges[:, 1])), shape=(len(vertices_mm),) * 2)
+    return csgraph.dijkstra(graph, directed=False, indices=np.flatnonzero(start), min_only=True)

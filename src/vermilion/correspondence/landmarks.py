@@ -1,0 +1,39 @@
+"""Landmarks of the neutral picture carried onto a mesh by ray casting."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.correspondence.surface_map import SurfaceMap
+from vermilion.mesh import Mesh, triangle_normals
+from vermilion.raycast import RayCaster
+
+#: Points of the 66-point scheme that mark the face's outline: they slide over the surface.
+JAW = np.arange(17)
+LIPS = np.arange(48, 66)
+
+
+def back_project(
+    points_px: np.ndarray, camera: Camera, mesh: Mesh, max_grazing_deg: float = 70.0
+) -> SurfaceMap:
+    """Where the rays of pixels (N, 2) meet a mesh in the camera's world.
+
+    A point is unbound where its ray misses the mesh or meets it at a grazing angle (more than
+    `max_grazing_deg` off the normal), where a pixel of error is many millimetres on the surface.
+    """
+    finite = np.isfinite(points_px).all(axis=1)
+    origins, directions = camera.rays(np.where(finite[:, None], points_px, 0.0))
+    hits = RayCaster(mesh.vertices_mm, mesh.triangles).cast(origins, directions)
+    normals = triangle_normals(mesh.vertices_mm, mesh.triangles)[np.maximum(hits.triangle, 0)]
+    facing = -(normals * directions).sum(axis=1)
+    good = finite & hits.hit & (facing > np.cos(np.deg2rad(max_grazing_deg)))
+    triangle = np.where(good, hits.triangle, -1).astype(np.int32)
+    return SurfaceMap(triangle, hits.barycentric.astype(np.float64))
+
+
+def inner_features(points: SurfaceMap) -> SurfaceMap:
+    """The same without the jaw's outline, which is no fixed place of the skin."""
+    triangle = points.triangle.copy()
+    triangle[JAW] = -1
+    return SurfaceMap(triangle, points.barycentric)

@@ -1,0 +1,1 @@
+"""Regressors from lip features to correction layers, their selection and their files."""

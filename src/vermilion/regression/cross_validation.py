@@ -1,0 +1,213 @@
+"""Choice of alpha and beta by cross-validation grouped by clip.
+
+All that the errors need of the targets is their Gram matrix Y Y' (F, F): it is formed once, in
+place of predictions of 9 T outputs for every grid point. For one beta and fold, one eigenvalue
+decomposition of the activations gives the errors of every alpha. No approximation is involved: a
+test holds the result against plain fitting and predicting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+from sklearn.model_selection import GroupKFold
+
+from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
+from vermilion.regression.scaling import feature_scale
+
+#: (rows to train on, rows to judge) -> their activations.
+DesignOfFold = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Root mean square error over held-out clips at each grid point.
+
+    Attributes:
+        alphas: (A,).
+        betas: (B,); NaN for a regressor without beta.
+        errors: (B, A, folds) RMS over the entries of the layer, each fold's frames.
+        frames: (folds,) held-out frames.
+    """
+
+    alphas: np.ndarray
+    betas: np.ndarray
+    errors: np.ndarray
+    frames: np.ndarray
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(B, A) RMS over all held-out frames."""
+        return np.sqrt((self.errors**2) @ self.frames / self.frames.sum())
+
+    @property
+    def standard_error(self) -> np.ndarray:
+        """(B, A) standard error of the mean over folds."""
+        return self.errors.std(axis=2, ddof=1) / np.sqrt(self.errors.shape[2])
+
+    def best(self) -> tuple[float, float, float]:
+        """(alpha, beta, error) of the least mean error; the larger alpha where equal."""
+        mean = self.mean[:, ::-1]
+        row, column = np.unravel_index(np.argmin(mean), mean.shape)
+        return float(self.alphas[::-1][column]), float(self.betas[row]), float(mean[row, column])
+
+
+def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
+    """Clip label of each row: contiguous stretches of a sequence, (F,) int.
+
+    Frames are in order of time within a sequence. Clips are shorter than `clip_frames` where that
+    is needed to have one for every fold.
+    """
+    sequences = np.asarray(sequences)
+    clip_frames = max(1, min(clip_frames, len(sequences) // n_folds))
+    _, label = np.unique(sequences, return_inverse=True)
+    clips = np.empty(len(sequences), dtype=np.int64)
+    first = 0
+    for k in range(label.max() + 1):
+        rows = np.flatnonzero(label == k)
+        n_clips = max(1, round(len(rows) / clip_frames))
+        clips[rows] = first + np.arange(len(rows)) * n_clips // len(rows)
+        first += n_clips
+    return clips
+
+
+def target_gram(targets: np.ndarray, output_weights: np.ndarray | None = None) -> np.ndarray:
+    """Y Y' (F, F) float64 of targets (F, K) less their mean, outputs weighted (K,)."""
+    block = 4096
+    gram = np.zeros((len(targets), len(targets)))
+    for first in range(0, targets.shape[1], block):
+        part = targets[:, first : first + block].astype(np.float32)
+        part -= part.mean(axis=0, dtype=np.float64).astype(np.float32)
+        if output_weights is not None:
+            part *= np.sqrt(output_weights[first : first + block]).astype(np.float32)
+        gram += part @ part.T
+    return gram
+
+
+def cross_validate_rbf(
+    features: np.ndarray,
+    gram: np.ndarray,
+    n_outputs: float,
+    sequences: np.ndarray,
+    clips: np.ndarray,
+    *,
+    alphas: Sequence[float],
+    betas: Sequence[float],
+    n_folds: int = 5,
+    prototype_stride: int = 10,
+    prototype_minimum: int = 20,
+    feature_groups: Sequence[str] | None = None,
+) -> Curve:
+    """Errors of `RBFNetwork` on a grid.
+
+    Scale and prototypes come from the rows trained on.
+
+    Args:
+        features: (F, M).
+        gram: (F, F), `target_gram` of the targets.
+        n_outputs: the sum of the output weights (their number where unweighted).
+        sequences: (F,) labels of the sequences.
+        clips: (F,) labels of the clips, which are held out whole.
+    """
+
+    def design_of(beta: float) -> DesignOfFold:
+        def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            mean, scale = feature_scale(features[train], feature_groups)
+            scaled = (features - mean) / scale
+            chosen = temporal_prototypes(sequences[train], prototype_stride, prototype_minimum)
+            prototypes = scaled[train[chosen]]
+            activations = gaussian_activations(scaled, prototypes, beta)
+            return activations[train], activations[held]
+
+        return design
+
+    errors = [_fold_errors(design_of(b), gram, clips, alphas, n_folds, n_outputs) for b in betas]
+    return Curve(
+        np.asarray(alphas, float),
+        np.asarray(betas, float),
+        np.stack([e for e, _ in errors]),
+        errors[0][1],
+    )
+
+
+def cross_validate_affine(
+    features: np.ndarray,
+    gram: np.ndarray,
+    n_outputs: float,
+    clips: np.ndarray,
+    *,
+    alphas: Sequence[float],
+    n_folds: int = 5,
+    feature_groups: Sequence[str] | None = None,
+) -> Curve:
+    """Errors of `AffineRegressor` for every alpha; arguments as `cross_validate_rbf`."""
+
+    def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mean, scale = feature_scale(features[train], feature_groups)
+        scaled = (features - mean) / scale
+        return scaled[train], scaled[held]
+
+    errors, frames = _fold_errors(design, gram, clips, alphas, n_folds, n_outputs)
+    return Curve(np.asarray(alphas, float), np.array([np.nan]), errors[None], frames)
+
+
+def _fold_errors(
+    design_of: DesignOfFold,
+    gram: np.ndarray,
+    clips: np.ndarray,
+    alphas: Sequence[float],
+    n_folds: int,
+    n_outputs: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """RMS errors (A, folds) and held-out frames (folds,)."""
+    n_folds = min(n_folds, len(np.unique(clips)))
+    if n_folds < 2:
+        raise ValueError("cross-validation needs at least two clips")
+    folds = GroupKFold(n_folds).split(clips, groups=clips)
+    errors, frames = [], []
+    for train, held in folds:
+        squared = _held_out_squared(*design_of(train, held), gram, train, held, alphas)
+        errors.append(np.sqrt(np.maximum(squared, 0.0) / (len(held) * n_outputs)))
+        frames.append(len(held))
+    return np.stack(errors, axis=1), np.array(frames)
+
+
+def _held_out_squared(
+    design_train: np.ndarray,
+    design_held: np.ndarray,
+    gram: np.ndarray,
+    train: np.ndarray,
+    held: np.ndarray,
+    alphas: Sequence[float],
+) -> np.ndarray:
+    """Squared error over the held-out rows for every alpha, (A,).
+
+    With B = Phi V the centred activations in their eigenbasis, D = 1 / (lambda + alpha), and K the
+    Gram matrix about the training mean, the error is
+    tr K_hh - 2 tr(B_h D B_t' K_th) + tr(B_h D B_t' K_tt B_t D B_h').
+    """
+    mean = design_train.mean(axis=0)
+    eigenvalues, basis = linalg.eigh(
+        (design_train - mean).T @ (design_train - mean), overwrite_a=True
+    )
+    eigenvalues = np.maximum(eigenvalues, 0.0)
+    rotated_train = (design_train - mean) @ basis
+    rotated_held = (design_held - mean) @ basis
+    to_train = gram[:, train].mean(axis=1)
+    offset = to_train[train].mean()
+    held_diagonal = gram[held, held] - 2 * to_train[held] + offset
+    # B_t sums to zero over the rows, so that centring K on the side of B_t changes nothing.
+    cross = rotated_train.T @ (gram[np.ix_(train, held)] - to_train[train][:, None])
+    linear = (cross * rotated_held.T).sum(axis=1)
+    quadratic = (rotated_train.T @ gram[np.ix_(train, train)] @ rotated_train) * (
+        rotated_held.T @ rotated_held
+    )
+    shrink = 1.0 / (eigenvalues[None] + np.asarray(alphas, float)[:, None])
+    return (
+        held_diagonal.sum()
+        - 2 * shrink @ linear
+        + np.einsum("ap,pq,aq->a", shrink, quadratic, shrink, optimize=True)
+    )

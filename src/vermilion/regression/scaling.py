@@ -1,0 +1,37 @@
+"""Scaling of features, so that one width of the basis functions fits all of them.
+
+The paper's beta = 0.1 belongs to the scale of its features, which it does not give. Here features
+are centred and scaled so that their total variance is 1: the mean squared distance of two frames
+is then 2, whatever the number of features, and beta has the same meaning on every data set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def feature_scale(
+    features: np.ndarray, groups: Sequence[str] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (M,) and divisor (M,) of features (F, M).
+
+    Args:
+        features: (F, M).
+        groups: M labels; the features of a group share one divisor, so that their own proportions
+            last (principal components keep their variances), and every group has the same total
+            variance. None: every feature is a group.
+
+    A feature that never changes gets the divisor of infinity: it tells nothing, and a new value of
+    it must not either.
+    """
+    features = np.asarray(features, dtype=np.float64)
+    mean, variance = features.mean(axis=0), features.var(axis=0)
+    labels = np.arange(features.shape[1]) if groups is None else np.asarray(groups)
+    _, group = np.unique(labels, return_inverse=True)
+    total = np.bincount(group, weights=variance)
+    constant = total <= 1e-24 * max(1.0, float(np.abs(mean).max(initial=0.0)) ** 2)
+    n_groups = max(int((~constant).sum()), 1)
+    divisor = np.sqrt(np.where(constant, np.inf, total) * n_groups)
+    return mean, divisor[group]
