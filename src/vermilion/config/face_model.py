@@ -41,14 +41,17 @@ class FaceModelConfig(StageConfig):
         0.09,
         ge=0.0,
         le=0.3,
-        description="Weight of jawOpen baked into the template's and the tracker's neutral, so that "
+        description="Weight of jawOpen baked into the template's neutral, so that "
         "the lips are parted (0 to 1).",
     )
     studio_spacing_mm: float = Field(
         0.8, ge=0.4, le=3.0, description="Vertex spacing at the lips of the procedural studio (mm)."
     )
     template_spacing_mm: float = Field(
-        1.0, ge=0.5, le=4.0, description="Vertex spacing at the lips of the procedural template (mm)."
+        1.0,
+        ge=0.5,
+        le=4.0,
+        description="Vertex spacing at the lips of the procedural template (mm).",
     )
     tracker_triangles: int = Field(
         6000, ge=1500, le=20000, description="Target triangle count of the tracker's mesh."

@@ -1,0 +1,193 @@
+"""The expressions of the generated head: ARKit names, displacements at weight 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vermilion.faces.procedural_fields import JAW_AT_CORNERS, JAW_OPEN_RAD, Fields, jaw_motion
+from vermilion.faces.procedural_head_mesh import loop_theta
+from vermilion.faces.procedural_mouth import lip_point
+
+#: Weight 1 of these moves the jaw bone too: opening angle and shift of the lower teeth.
+JAW_MOTIONS: dict[str, tuple[float, tuple[float, float, float]]] = {
+    "jawOpen": (JAW_OPEN_RAD, (0.0, 0.0, 0.0)),
+    "jawForward": (0.0, (0.0, -0.6, 5.0)),
+    "jawLeft": (0.0, (7.0, 0.0, 0.0)),
+    "jawRight": (0.0, (-7.0, 0.0, 0.0)),
+}
+
+
+def jaw_motion_of(f: Fields, name: str) -> np.ndarray:
+    open_rad, shift = JAW_MOTIONS[name]
+    return f.jaw(open_rad, shift)
+
+
+def mouth_close(f: Fields) -> np.ndarray:
+    """Undo jawOpen's parting of the lips: together at weight 1 they give closed lips, open teeth."""
+    meeting = lip_point(loop_theta(), np.ones(len(f.u)))
+    motion = jaw_motion(meeting, JAW_OPEN_RAD, (0.0, 0.0, 0.0))
+    curve = (JAW_AT_CORNERS - f.jaw_loop)[:, None] * motion
+    return f.lips(curve[:, 0], curve[:, 1], curve[:, 2], 30.0)
+
+
+def mouth_pucker(f: Fields, rolls: bool) -> np.ndarray:
+    out = f.lips(
+        -0.36 * 26.0 * f.u * (1 - 0.1 * f.u**2),
+        0.9 * f.upper - 0.5 * f.lower,
+        6.0 + 1.5 * np.abs(f.u) ** 2,
+        48.0,
+    )
+    return out + (f.roll(-0.35 * f.middle) if rolls else 0.0)
+
+
+def mouth_funnel(f: Fields, rolls: bool) -> np.ndarray:
+    out = f.lips(-0.24 * 26.0 * f.u, 4.5 * f.upper - 6.0 * f.lower, 5.0 * np.ones_like(f.u), 46.0)
+    return out + (f.roll(-0.5 * f.middle) if rolls else 0.0)
+
+
+def mouth_sideways(f: Fields, side: float) -> np.ndarray:
+    lead = 0.5 * (1 + side * f.u)
+    return f.lips(side * (8.0 - 2.0 * lead), 1.2 * f.corner(side), -2.5 * f.corner(side), 46.0)
+
+
+def mouth_smile(f: Fields, side: float) -> np.ndarray:
+    c = f.corner(side)
+    lips = f.lips(
+        side * 7.0 * c, 6.5 * c + 0.4 * f.upper * f.half(side), -4.5 * c - 0.6 * f.half(side), 52.0
+    )
+    cheek = f.bumped(side * 42, -8, 15, 13, (side * 1.0, 4.5, 3.5))
+    return lips + cheek + f.thin(0.16 * f.half(side) * f.middle)
+
+
+def mouth_frown(f: Fields, side: float) -> np.ndarray:
+    c = f.corner(side)
+    return f.lips(side * 1.5 * c, -7.0 * c, -1.0 * c, 40.0)
+
+
+def mouth_stretch(f: Fields, side: float) -> np.ndarray:
+    c = f.corner(side)
+    lips = f.lips(side * 8.0 * c, -3.0 * c, -5.0 * c - 0.5 * f.half(side), 46.0)
+    return lips + f.thin(0.18 * f.half(side) * f.middle)
+
+
+def mouth_dimple(f: Fields, side: float) -> np.ndarray:
+    c = f.corner(side) ** 2
+    return f.lips(side * 4.0 * c, 1.0 * c, -4.5 * c, 30.0)
+
+
+def mouth_press(f: Fields, side: float, rolls: bool) -> np.ndarray:
+    half = f.half(side) * f.middle
+    lips = f.lips(0.0, 0.0, -1.2 * half, 22.0)
+    roll = f.roll(0.35 * half) if rolls else 0.0
+    return lips + roll + f.thin(0.30 * half)
+
+
+def mouth_upper_up(f: Fields, side: float) -> np.ndarray:
+    lift = f.half(side) * f.upper
+    return f.lips(side * 0.6 * lift, 6.0 * lift, 0.8 * lift, 34.0) + f.roll(-0.15 * lift)
+
+
+def mouth_lower_down(f: Fields, side: float) -> np.ndarray:
+    drop = f.half(side) * f.lower
+    return f.lips(side * 0.8 * drop, -6.5 * drop, 0.5 * drop, 34.0) + f.roll(-0.12 * drop)
+
+
+def mouth_roll(f: Fields, lip: np.ndarray, sign: float, inward: bool) -> np.ndarray:
+    """`sign` +1 for the upper lip. Inward: the red turns into the mouth; outward: it everts."""
+    lip = f.widened(lip)
+    if inward:
+        draw = f.lips(0.0, -sign * 1.2 * lip, -3.2 * lip, 22.0)
+        return f.roll(1.05 * lip) + draw + f.thin(0.22 * lip)
+    return f.roll(-0.85 * lip) + f.lips(0.0, sign * 1.4 * lip, 1.6 * lip, 24.0)
+
+
+def mouth_shrug(f: Fields, lip: np.ndarray, up: float) -> np.ndarray:
+    return f.lips(0.0, up * lip, 1.5 * lip, 40.0)
+
+
+def cheek_puff(f: Fields) -> np.ndarray:
+    out = f.lips(0.0, 0.0, 2.0 * np.ones_like(f.u), 34.0)
+    for side in (1.0, -1.0):
+        out = out + f.bumped(side * 44, -38, 14, 14, (side * 6.5, 0.0, 7.0))
+    return out
+
+
+def nose_sneer(f: Fields, side: float) -> np.ndarray:
+    lift = f.half(side) * f.upper
+    return f.bumped(side * 14, -8, 7, 8, (side * 0.6, 3.4, 0.6)) + f.lips(
+        0.0, 2.2 * lift, 0.4 * lift, 26.0
+    )
+
+
+def cheek_squint(f: Fields, side: float) -> np.ndarray:
+    return f.bumped(side * 40, 3, 14, 9, (0.0, 4.0, 2.5))
+
+
+def brow_inner_up(f: Fields) -> np.ndarray:
+    out = f.bumped(11, 48, 11, 8, (-0.5, 5.0, 0.6))
+    return out + f.bumped(-11, 48, 11, 8, (0.5, 5.0, 0.6))
+
+
+def brow_down(f: Fields, side: float) -> np.ndarray:
+    return f.bumped(side * 22, 46, 14, 7, (-side * 2.2, -5.0, 0.8))
+
+
+def brow_outer_up(f: Fields, side: float) -> np.ndarray:
+    return f.bumped(side * 40, 46, 11, 8, (0.0, 5.0, 0.3))
+
+
+def _sided(name: str, build: Callable[[Fields, float], np.ndarray]) -> dict:
+    return {
+        f"{name}_L": lambda f: build(f, 1.0),
+        f"{name}_R": lambda f: build(f, -1.0),
+    }
+
+
+def _library(rolls: bool) -> dict[str, Callable[[Fields], np.ndarray]]:
+    shapes: dict[str, Callable[[Fields], np.ndarray]] = {
+        name: (lambda f, name=name: jaw_motion_of(f, name)) for name in JAW_MOTIONS
+    }
+    shapes["mouthClose"] = mouth_close
+    shapes["mouthPucker"] = lambda f: mouth_pucker(f, rolls)
+    shapes["mouthFunnel"] = lambda f: mouth_funnel(f, rolls)
+    shapes["mouthLeft"] = lambda f: mouth_sideways(f, 1.0)
+    shapes["mouthRight"] = lambda f: mouth_sideways(f, -1.0)
+    shapes |= _sided("mouthSmile", mouth_smile)
+    shapes |= _sided("mouthFrown", mouth_frown)
+    shapes |= _sided("mouthStretch", mouth_stretch)
+    shapes |= _sided("mouthDimple", mouth_dimple)
+    shapes |= _sided("mouthPress", lambda f, side: mouth_press(f, side, rolls))
+    shapes |= _sided("mouthUpperUp", mouth_upper_up)
+    shapes |= _sided("mouthLowerDown", mouth_lower_down)
+    shapes["mouthRollUpper"] = lambda f: mouth_roll(f, f.upper, 1.0, True)
+    shapes["mouthRollLower"] = lambda f: mouth_roll(f, f.lower, -1.0, True)
+    shapes["mouthRollOutUpper"] = lambda f: mouth_roll(f, f.upper, 1.0, False)
+    shapes["mouthRollOutLower"] = lambda f: mouth_roll(f, f.lower, -1.0, False)
+    shapes["mouthShrugUpper"] = lambda f: mouth_shrug(f, f.upper, 2.5)
+    shapes["mouthShrugLower"] = lambda f: mouth_shrug(f, f.lower, 1.0)
+    shapes["cheekPuff"] = cheek_puff
+    shapes |= _sided("cheekSquint", cheek_squint)
+    shapes |= _sided("noseSneer", nose_sneer)
+    shapes |= _sided("eyeBlink", lambda f, side: f.lids(side, 1.0))
+    shapes |= _sided("eyeWide", lambda f, side: f.lids(side, -0.22))
+    shapes["browInnerUp"] = brow_inner_up
+    shapes |= _sided("browDown", brow_down)
+    shapes |= _sided("browOuterUp", brow_outer_up)
+    return shapes
+
+
+STUDIO_SHAPES = tuple(_library(True))
+#: The tracker knows no rolls, no press, no funnel, no shrugs, no dimples: the correction's work.
+TRACKER_SHAPES = tuple(
+    name
+    for name in STUDIO_SHAPES
+    if not any(w in name for w in ("Roll", "Press", "Funnel", "Shrug", "Dimple", "Wide", "Squint"))
+)
+
+
+def expressions(f: Fields, names: tuple[str, ...], rolls: bool) -> np.ndarray:
+    """Displacements (K, V, 3) float32 mm at weight 1; without `rolls` lips only translate."""
+    library = _library(rolls)
+    return np.stack([library[name](f) for name in names]).astype(np.float32)
