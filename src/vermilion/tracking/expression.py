@@ -152,6 +152,9 @@ class _TakeProblem:
         rotation, translation, weights = first_guess(
             self.shape, self.seen[known], self.sigma_mm, focal, self.settings.weight_sigma
         )
+        # Fixed from here on: deviations that grew as the head came nearer would pull it nearer.
+        scale = fill_gaps(self.focal / translation[:, 2:], known, self.n_frames)
+        self.sigma_px = self.sigma_mm * scale
         vectors, self.reference = in_chart(rotation)
         values = np.concatenate([vectors, translation, weights], axis=1)
         return fill_gaps(values, known, self.n_frames)
@@ -165,8 +168,7 @@ class _TakeProblem:
         self, points: np.ndarray, frames: slice
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         image = project(points, self.focal)
-        sigma_px = self.sigma_mm * self.focal / points[..., 2].mean(axis=1)[:, None]
-        white = whitening(image, sigma_px, self.seen.trust[frames], self.settings.jaw_slide)
+        white = whitening(image, self.sigma_px[frames], self.seen.trust[frames], self.settings.jaw_slide)
         residual = (white @ (image - self.seen.image[frames])[..., None])[..., 0]
         return image, white, residual
 

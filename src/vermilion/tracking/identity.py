@@ -14,6 +14,7 @@ from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
 from vermilion.tracking.expression import N_POSE, FitSettings
 from vermilion.tracking.observation import (
+    LandmarkNoise,
     Observations,
     pose_jacobian,
     project,
@@ -23,7 +24,7 @@ from vermilion.tracking.observation import (
     whitening,
 )
 from vermilion.tracking.pose import rotation_of
-from vermilion.tracking.shape import LandmarkShape, landmark_identities
+from vermilion.tracking.shape import LandmarkShape, landmark_identities, without_size
 from vermilion.tracking.start import first_guess, in_chart
 
 
@@ -33,15 +34,15 @@ class IdentitySettings:
 
     Attributes:
         fit: noise and weights, as in tracking.
-        offset_sigma_mm: how far a person's landmarks, as the detector sees them, lie from the
-            model's.
+        bias: how far a person's landmarks, as the detector sees them, lie from the model's in
+            every frame alike, as fractions of the inter-ocular distance.
         neutral_weight_sigma: deviation of the weights in a frame known to be neutral.
         focal_sigma: deviation of the logarithm of an unknown focal length about the guess.
         iterations: of Gauss-Newton, at most.
     """
 
     fit: FitSettings = field(default_factory=FitSettings)
-    offset_sigma_mm: float = 1.5
+    bias: LandmarkNoise = field(default_factory=lambda: LandmarkNoise(0.08, 0.05, 0.04, 0.04, 0.04))
     neutral_weight_sigma: float = 0.03
     focal_sigma: float = 0.3
     iterations: int = 60
@@ -122,7 +123,7 @@ class _IdentityProblem:
             )
         self.samples, self.settings = samples, settings
         self.shape = LandmarkShape.of(model)
-        self.identities = landmark_identities(model)
+        self.identities = without_size(landmark_identities(model), self.shape.neutral_mm)
         self.n_identity, self.n_weights = len(self.identities), self.shape.n_expressions
         parts = [sample.seen[k] for sample, k in zip(samples, keep, strict=True)]
         self.image = np.concatenate([part.image for part in parts])
@@ -134,17 +135,18 @@ class _IdentityProblem:
         self.frame_prior = np.zeros((self.n_frames, N_POSE + self.n_weights))
         self.frame_prior[:, N_POSE:] = sigma[:, None] ** -2.0
         self.guess = np.log([sample.focal_px for sample in samples])
+        corners = self.shape.neutral_mm[[36, 45]]
+        interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
         # A known focal length is one whose prior is so tight that it cannot move.
         loose = np.array([not sample.calibrated for sample in samples])
         self.shared_prior = np.concatenate(
             [
                 np.ones(self.n_identity),
-                np.full(198, settings.offset_sigma_mm**-2.0),
+                np.repeat((settings.bias.per_landmark() * interocular_mm) ** -2.0, 3),
                 np.where(loose, settings.focal_sigma**-2.0, 1e12),
             ]
         )
-        corners = self.shape.neutral_mm[[36, 45]]
-        self.sigma_mm = settings.fit.noise.per_landmark() * np.linalg.norm(corners[0] - corners[1])
+        self.sigma_mm = settings.fit.noise.per_landmark() * interocular_mm
 
     def first_guess(self):
         seen = Observations(self.image, self.trust, np.ones(self.n_frames, dtype=bool))
@@ -156,6 +158,7 @@ class _IdentityProblem:
             self.settings.fit.weight_sigma,
         )
         vectors, self.reference = in_chart(rotation)
+        self.sigma_px = self.sigma_mm * (np.exp(self.guess)[self.take] / translation[:, 2])[:, None]
         frames = np.concatenate([vectors, translation, weights], axis=1)
         shared = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
         return frames, shared
@@ -170,8 +173,7 @@ class _IdentityProblem:
 
     def _residual(self, points: np.ndarray, focal: np.ndarray):
         image = project(points, focal)
-        sigma_px = self.sigma_mm * focal / points[..., 2].mean(axis=1)[:, None]
-        white = whitening(image, sigma_px, self.trust, self.settings.fit.jaw_slide)
+        white = whitening(image, self.sigma_px, self.trust, self.settings.fit.jaw_slide)
         return image, white, (white @ (image - self.image)[..., None])[..., 0]
 
     def _camera_points(self, frames: np.ndarray, shared: np.ndarray) -> np.ndarray:

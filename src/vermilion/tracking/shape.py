@@ -53,3 +53,14 @@ def landmark_neutral(model: FaceModel) -> np.ndarray:
 def landmark_identities(model: FaceModel) -> np.ndarray:
     """(I, 66, 3) displacements at one standard deviation."""
     return model.identities_mm[:, model.landmarks].astype(np.float64)
+
+
+def without_size(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+    """Displacements (I, N, 3) less their share of uniform growth of the neutral (N, 3).
+
+    One camera cannot tell a small near head from a large far one. Left in, growth would be set by
+    what it does to the blend weights: on a smaller head the same motion needs smaller ones.
+    """
+    centred = neutral_mm - neutral_mm.mean(axis=0)
+    growth = np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()
+    return displacements_mm - growth[:, None, None] * centred

@@ -47,7 +47,10 @@ def first_guess(
         for frame in range(n_frames):
             matrix = BandMatrix(blocks[frame][None], none, none)
             weights[frame] = solve_in_box(matrix, right[frame][None], 0.0, 1.0)[0]
-    depth = focal / scale
+    # The scale holds at the depth of the points' mean, not of the head's origin.
+    share = (trust / trust.sum(axis=1, keepdims=True))[..., None]
+    mean = (share * shape.points(weights)).sum(axis=1)
+    depth = focal / scale - np.einsum("fj,fj->f", rotation[:, 2], mean)
     translation = np.concatenate([centre / scale[:, None], depth[:, None]], axis=1)
     return rotation, translation, weights
 

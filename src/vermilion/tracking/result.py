@@ -1,0 +1,159 @@
+"""What tracking leaves in files: the person (`identity.npz`) and the take's motion (`fit.npz`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.errors import InputError
+from vermilion.faces.model import FaceModel
+from vermilion.files import atomic_path
+from vermilion.tracking.expression import HeadMotion
+
+
+@dataclass(frozen=True)
+class Identity:
+    """One person in the tracker's model.
+
+    Attributes:
+        identity: (I,) in standard deviations.
+        neutral_mm: (V, 3) in the head frame.
+        landmark_offset_mm: (66, 3) in the head frame: where the detector sees the neutral's
+            landmarks, less where the model has them.
+        takes: (T,) str, all of the subject's takes that were used.
+        focal_px: (T,) known or estimated.
+        calibrated: (T,) bool, whether it was known.
+    """
+
+    identity: np.ndarray
+    neutral_mm: np.ndarray
+    landmark_offset_mm: np.ndarray
+    takes: np.ndarray
+    focal_px: np.ndarray
+    calibrated: np.ndarray
+
+    def focal_of(self, take: str) -> float | None:
+        """Estimated focal length of a take; None where the take is unknown or calibrated."""
+        for name, focal, known in zip(self.takes, self.focal_px, self.calibrated, strict=True):
+            if name == take and not known:
+                return float(focal)
+        return None
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        _save(path, self)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Identity:
+        """Read what `save` wrote."""
+        return cls(**_load(path, cls))
+
+
+@dataclass(frozen=True)
+class TrackedTake:
+    """Pose and blend weights of every frame of a take, in the world.
+
+    C_f = vertices(weights_f) @ world_from_head_rotation_f.T + world_from_head_translation_f.
+
+    Attributes:
+        frames: (F,) int.
+        weights: (F, K) in [0, 1], in the order of `expression_names`.
+        expression_names: (K,) str.
+        world_from_head_rotation: (F, 3, 3).
+        world_from_head_translation_mm: (F, 3).
+        valid: (F,) bool; poses and weights of the others are interpolated.
+        reprojection_px: (F,) RMS over the landmarks but the jaw's; NaN where none were found.
+        camera_name, camera_model, camera_params, camera_size_px, cam_from_world: the camera of the
+            pictures, with the focal length that was used.
+    """
+
+    frames: np.ndarray
+    weights: np.ndarray
+    expression_names: np.ndarray
+    world_from_head_rotation: np.ndarray
+    world_from_head_translation_mm: np.ndarray
+    valid: np.ndarray
+    reprojection_px: np.ndarray
+    camera_name: np.ndarray
+    camera_model: np.ndarray
+    camera_params: np.ndarray
+    camera_size_px: np.ndarray
+    cam_from_world: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        frames: np.ndarray,
+        motion: HeadMotion,
+        valid: np.ndarray,
+        camera: Camera,
+        model: FaceModel,
+    ) -> TrackedTake:
+        """Motion relative to the camera, carried to the world."""
+        to_world = camera.rotation.T
+        return cls(
+            frames=np.asarray(frames),
+            weights=motion.weights,
+            expression_names=np.array(model.expression_names, dtype=str),
+            world_from_head_rotation=to_world @ motion.rotation,
+            world_from_head_translation_mm=(motion.translation_mm - camera.translation)
+            @ to_world.T,
+            valid=np.asarray(valid, dtype=bool),
+            reprojection_px=motion.reprojection_px,
+            camera_name=np.array(camera.name),
+            camera_model=np.array(camera.model),
+            camera_params=np.array(camera.params, dtype=np.float64),
+            camera_size_px=np.array([camera.width_px, camera.height_px]),
+            cam_from_world=np.asarray(camera.cam_from_world, dtype=np.float64),
+        )
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the pictures."""
+        width, height = (int(n) for n in self.camera_size_px)
+        params = tuple(float(p) for p in self.camera_params)
+        return Camera(
+            str(self.camera_name), str(self.camera_model), params, width, height, self.cam_from_world
+        )
+
+    def index_of(self, frames: np.ndarray | list[int]) -> np.ndarray:
+        """Rows of frame numbers. Raises KeyError where one is not in the take."""
+        rows = {int(frame): row for row, frame in enumerate(self.frames)}
+        return np.array([rows[int(frame)] for frame in frames], dtype=np.int64)
+
+    def vertices_mm(self, model: FaceModel, identity: Identity, rows: np.ndarray) -> np.ndarray:
+        """Meshes of some rows in the world, (len(rows), V, 3)."""
+        local = model.vertices(identity.identity, self.weights[rows])
+        turned = local @ np.swapaxes(self.world_from_head_rotation[rows], 1, 2)
+        return turned + self.world_from_head_translation_mm[rows, None]
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        _save(path, self)
+
+    @classmethod
+    def load(cls, path: str | Path) -> TrackedTake:
+        """Read what `save` wrote."""
+        return cls(**_load(path, cls))
+
+
+def _save(path: str | Path, record) -> None:
+    arrays = {item.name: np.asarray(getattr(record, item.name)) for item in fields(record)}
+    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+        np.savez(stream, **arrays)
+
+
+def _load(path: str | Path, kind: type) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {item.name: data[item.name] for item in fields(kind)}
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(
+            f"an unreadable tracking file ({error})",
+            f"a .npz of {kind.__name__}",
+            "Remove the file and run again.",
+            path=path,
+        ) from error
