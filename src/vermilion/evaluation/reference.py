@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.evaluation.closest import Surface, SurfacePoints
-from vermilion.mesh import vertex_normals
+from vermilion.mesh import triangle_normals, vertex_normals
 
 _CROP_MARGIN_MM = 25.0
 
@@ -92,16 +92,15 @@ def transfer_lips(
         vertices_mm, triangles, lips: the labelled mesh, labels (V,).
         to_vertices_mm, to_triangles: the mesh without labels.
     """
-    source = Surface(vertices_mm, triangles)
-    normals = vertex_normals(to_vertices_mm, to_triangles)
-    found = source.closest(to_vertices_mm, normals, min_cosine)
+    # By the triangles' middles: where lips touch, vertices lie on both.
+    middles = to_vertices_mm[to_triangles].mean(axis=1)
+    normals = triangle_normals(to_vertices_mm, to_triangles)
+    found = Surface(vertices_mm, triangles).closest(middles, normals, min_cosine)
     near = found.found & (found.distance_mm <= max_distance_mm)
-    of_triangle = lips[triangles].max(axis=1)
-    labels = np.where(near, of_triangle[np.maximum(found.triangle, 0)], 0)
-    corners = labels[to_triangles]
-    # A triangle with corners on both lips is on neither.
+    corners = lips[triangles]
     both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
-    return np.where(both, 0, corners.max(axis=1))
+    of_triangle = np.where(both, 0, corners.max(axis=1))
+    return np.where(near, of_triangle[np.maximum(found.triangle, 0)], 0)
 
 
 def truth_of_vertices(
@@ -140,3 +139,32 @@ def truth_of_vertices(
         found.barycentric,
         np.where(known, found.distance_mm, np.inf),
     )
+
+
+def drift(
+    sequence_mm: np.ndarray,
+    triangles: np.ndarray,
+    reference: Reference,
+    vertices: np.ndarray,
+    min_cosine: float,
+) -> np.ndarray:
+    """How far each vertex has slid along the true surface since the neutral, (F, V) mm.
+
+    Distance between the point of the truth that the vertex lies on (nearest, facing the same way)
+    and the point that it lay on in the neutral. NaN for vertices that are not asked for.
+
+    Args:
+        sequence_mm: (F, V, 3) in the reference's world; triangles: (T, 3) of it.
+        vertices: (V,) bool.
+    """
+    ids = np.flatnonzero(vertices)
+    result = np.full(sequence_mm.shape[:2], np.nan)
+    for frame, (points, surface_mm) in enumerate(
+        zip(sequence_mm, reference.vertices_mm, strict=True)
+    ):
+        surface = Surface(surface_mm, reference.triangles)
+        normals = vertex_normals(points.astype(np.float64), triangles)[ids]
+        found = surface.closest(points[ids], normals, min_cosine)
+        nearest = found.on(np.asarray(surface_mm, dtype=np.float64), reference.triangles)
+        result[frame, ids] = np.linalg.norm(nearest - reference.points_mm[frame, ids], axis=1)
+    return result

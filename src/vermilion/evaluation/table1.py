@@ -1,0 +1,67 @@
+"""Lips16 table 1: mean and deviation of the vertex error of every regressor."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+#: In the paper's order; what lies between the table's own columns is ours.
+_ORDER = ("base", "contour", "oracle", "PS", "MS", "GR")
+
+
+def kind_of(regressor: str) -> str:
+    """`PS-s1/affine` -> `PS/affine`: the regressor without the subject it was made for."""
+    name, _, variant = regressor.partition("/")
+    kind = name.split("-", 1)[0] if name.startswith(("PS-", "GR-")) else name
+    return f"{kind}/{variant}" if variant else kind
+
+
+def in_order(regressors) -> list[str]:
+    """Regressors in the order of the paper's table, variants after them."""
+
+    def place(name: str):
+        kind, _, variant = kind_of(name).partition("/")
+        rank = _ORDER.index(kind) if kind in _ORDER else len(_ORDER)
+        return bool(variant), rank, name
+
+    return sorted(set(regressors), key=place)
+
+
+def table1(measures: pd.DataFrame, region: str = "mouth") -> pd.DataFrame:
+    """Rows of table 1 in millimetres, one a take and regressor, and `all` for the takes together.
+
+    Args:
+        measures: rows of `measures.tsv`.
+
+    Returns:
+        columns subject, take, regressor, mean_mm, low_mm, high_mm, std_mm, ratio_to_base, frames.
+    """
+    rows = measures[(measures["region"] == region) & (measures["regressor"] != "H")]
+    records = []
+    for (subject, take), of_take in rows.groupby(["subject", "take"], sort=False):
+        for regressor in in_order(of_take["regressor"]):
+            figures = of_take[of_take["regressor"] == regressor].set_index("measure")
+            if "vertex_error_mean_mm" not in figures.index:
+                continue
+            mean = figures.loc["vertex_error_mean_mm"]
+            value = figures["value"]
+            records.append(
+                {
+                    "subject": subject,
+                    "take": take,
+                    "regressor": regressor,
+                    "mean_mm": mean["value"],
+                    "low_mm": mean["low"],
+                    "high_mm": mean["high"],
+                    "std_mm": value.get("vertex_error_std_mm"),
+                    "ratio_to_base": 1.0 if regressor == "base" else value.get("ratio_to_base"),
+                    "frames": int(mean["frames"]),
+                }
+            )
+    columns = [
+        "subject", "take", "regressor", "mean_mm", "low_mm", "high_mm", "std_mm",
+        "ratio_to_base", "frames",
+    ]  # fmt: skip
+    table = pd.DataFrame(records, columns=columns)
+    # The takes together come first.
+    together = table["subject"] == "all"
+    return pd.concat([table[together], table[~together]], ignore_index=True)

@@ -1,0 +1,166 @@
+"""One take under test: every regressor against the reference, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vermilion.evaluation.alignment import align_frames, moved
+from vermilion.evaluation.errors import (
+    ClipSums,
+    by_clip,
+    gaps_in_head,
+    sums_of_aperture,
+    sums_of_errors,
+    sums_of_jitter,
+    surface_errors,
+    vertex_errors,
+)
+from vermilion.evaluation.lips import aperture_mm, columns_of, lip_sides
+from vermilion.evaluation.masks import Regions
+from vermilion.evaluation.reference import Reference
+from vermilion.evaluation.statistics import clips_of
+from vermilion.faces.model import FaceModel
+from vermilion.progress import progress
+
+
+@dataclass(frozen=True)
+class TakeResult:
+    """What the measurement of a take gives.
+
+    Attributes:
+        sums: regressor -> sums by clip, for `measure_rows`.
+        table: per frame and regressor: frame, regressor, vermilion_mm, mouth_mm, aperture_mm; the
+            regressor `truth` has its aperture alone.
+        aligned_mm: regressor -> (F, V, 3) in the reference's world.
+        errors_mm: regressor -> (F, V) vertex error; NaN where a vertex has no counterpart.
+        head_rotations: (F, 3, 3) from the reference's world to the head frame.
+        clips: (F,) clip of each frame.
+    """
+
+    sums: dict[str, ClipSums]
+    table: pd.DataFrame
+    aligned_mm: dict[str, np.ndarray]
+    errors_mm: dict[str, np.ndarray]
+    head_rotations: np.ndarray
+    clips: np.ndarray
+
+
+def evaluate_take(
+    sequences_mm: dict[str, np.ndarray],
+    frames: np.ndarray,
+    model: FaceModel,
+    regions: Regions,
+    reference: Reference,
+    clip_frames: int,
+    touch_mm: float,
+    gape_mm: float,
+) -> TakeResult:
+    """Measure `base` and its corrections after one rigid alignment a frame.
+
+    The alignment is that of the base track, on the face outside the mouth mask; it is used for every
+    correction of it.
+
+    Args:
+        sequences_mm: regressor -> (F, V, 3) in the tracker's world; has `base`.
+        frames: (F,) frame numbers.
+        regions: of the topology of the sequences; vertices without a counterpart are left out here.
+        reference: of the same frames.
+    """
+    regions = regions.restricted(reference.valid)
+    rotations, translations = align_frames(sequences_mm["base"], reference.points_mm, regions.rest)
+    aligned = {name: moved(s, rotations, translations) for name, s in sequences_mm.items()}
+    neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
+    head_rotations, _ = align_frames(reference.points_mm, neutral, regions.rest)
+    clips = clips_of(frames, clip_frames)
+    sides, columns = lip_sides(model), columns_of(model)
+    true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
+    surface = surface_errors(
+        aligned, reference, regions.used, lambda items: progress(items, "surface errors")
+    )
+    # A lip vertex that has no counterpart is left out of both gaps.
+    columns = np.where(reference.valid, columns, -1)
+    sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps)]
+    for name, sequence in aligned.items():
+        gaps = gaps_in_head(sequence, head_rotations, sides, columns)
+        errors[name] = vertex_errors(sequence, reference)
+        sums[name] = (
+            sums_of_errors(errors[name], surface[name], regions, clips)
+            + sums_of_jitter(sequence, reference, frames, regions, clips)
+            + sums_of_aperture(gaps, true_gaps, clips, touch_mm, gape_mm)
+        )
+        rows.append(_frame_rows(name, frames, errors[name], regions, gaps))
+    table = pd.concat(rows, ignore_index=True)
+    return TakeResult(sums, table, aligned, errors, head_rotations, clips)
+
+
+def evaluate_reconstruction(
+    sequence_mm: np.ndarray,
+    frames: np.ndarray,
+    regions: Regions,
+    reference: Reference,
+    drift_mm: np.ndarray,
+    clip_frames: int,
+) -> dict[str, ClipSums]:
+    """Measure **H** itself against known truth, in the rig's world, without alignment.
+
+    Args:
+        sequence_mm: (F, V, 3) of H.
+        reference: truth, followed from the neutral.
+        drift_mm: (F, V) of `drift`.
+    """
+    regions = regions.restricted(reference.valid)
+    clips = clips_of(frames, clip_frames)
+    surface = surface_errors(
+        {"H": sequence_mm}, reference, regions.used, lambda items: progress(items, "H")
+    )["H"]
+    sums = sums_of_errors(vertex_errors(sequence_mm, reference), surface, regions, clips)
+    sums += sums_of_jitter(sequence_mm, reference, frames, regions, clips)
+    for region, weights in regions.weights.items():
+        finite = np.isfinite(drift_mm)
+        total = (np.where(finite, drift_mm, 0.0) * weights).sum(axis=1)
+        sums += ClipSums(
+            {
+                f"{region}.drift": by_clip(total, clips),
+                f"{region}.drift_weight": by_clip((finite * weights).sum(axis=1), clips),
+            }
+        )
+    return {"H": sums}
+
+
+def sums_of_layers(
+    regressed: np.ndarray, true: np.ndarray, areas: np.ndarray, clips: np.ndarray
+) -> ClipSums:
+    """Sums behind `feature_error`: RMS of regressed against true layer entries, weighted by area.
+
+    Args:
+        regressed, true: (F, T, 9); areas: (T,) of the mask's triangles.
+    """
+    square = ((regressed - true) ** 2).mean(axis=2) @ areas
+    known = np.isfinite(square)
+    return ClipSums(
+        {
+            "mouth.feature_square": by_clip(np.where(known, square, 0.0), clips),
+            "mouth.feature_entries": by_clip(known * areas.sum(), clips),
+        }
+    )
+
+
+def _frame_rows(
+    name: str,
+    frames: np.ndarray,
+    errors_mm: np.ndarray | None,
+    regions: Regions,
+    gaps: np.ndarray,
+) -> pd.DataFrame:
+    columns = {"frame": frames, "regressor": name}
+    for region in ("vermilion", "mouth"):
+        weights = regions.weights[region]
+        value = np.full(len(frames), np.nan)
+        if errors_mm is not None and weights.sum() > 0:
+            value = np.nan_to_num(errors_mm) @ weights / (np.isfinite(errors_mm) @ weights)
+        columns[f"{region}_mm"] = value
+    columns["aperture_mm"] = aperture_mm(gaps)
+    return pd.DataFrame(columns)

@@ -1,0 +1,158 @@
+"""Errors of a sequence: known displacements give known figures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from evaluation_face import mouth_triangles, sheet_face
+
+from vermilion.evaluation.errors import ClipSums, second_differences
+from vermilion.evaluation.masks import regions_of_mask
+from vermilion.evaluation.measures import measure_rows
+from vermilion.evaluation.reference import Reference
+from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
+from vermilion.mesh import vertex_areas
+
+FRAMES = np.arange(10, 16)
+
+
+@pytest.fixture(scope="module")
+def face():
+    model = sheet_face()
+    return model, regions_of_mask(model, model.neutral_mm, mouth_triangles(model))
+
+
+def moving(model) -> np.ndarray:
+    """Truth of six frames: the jaw opens and closes again."""
+    opening = np.array([0.0, 2.0, 4.0, 3.0, 1.0, 0.0])
+    below = (model.neutral_mm[:, 1] < -0.5) & (np.hypot(*model.neutral_mm[:, :2].T) < 25)
+    below |= model.regions["vermilion_lower"]
+    truth = np.repeat(model.neutral_mm[None], len(FRAMES), axis=0)
+    truth[:, below, 1] -= opening[:, None]
+    return truth
+
+
+def turned(sequence: np.ndarray, degrees: float, shift) -> np.ndarray:
+    angle = np.radians(degrees)
+    rotation = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    return sequence @ rotation.T + shift
+
+
+def evaluate(model, regions, sequences, truth):
+    reference = Reference("truth", truth, truth, model.triangles)
+    result = evaluate_take(sequences, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    rows = measure_rows(result.sums, "s", "t", len(FRAMES), 200, 0.95, 0)
+    return result, rows.set_index(["measure", "region", "regressor"])["value"]
+
+
+def test_truth_in_another_world_has_no_error(face):
+    model, regions = face
+    truth = moving(model)
+    elsewhere = turned(truth, 25.0, (300.0, -40.0, 900.0))
+    _, value = evaluate(model, regions, {"base": elsewhere}, truth)
+    for region in ("vermilion", "mouth", "face"):
+        assert value["vertex_error_mean_mm", region, "base"] < 1e-9
+        assert value["surface_error_max_mm", region, "base"] < 1e-5
+        assert abs(value["jitter_mm", region, "base"]) < 1e-9
+    assert value["aperture_error_mm", "mouth", "base"] < 1e-9
+
+
+def test_known_offset_of_the_lips_is_found_and_halved(face):
+    model, regions = face
+    truth = moving(model)
+    lips = regions.lips > 0
+    base, half = truth.copy(), truth.copy()
+    base[:, lips, 2] += 3.0
+    half[:, lips, 2] += 1.5
+    _, value = evaluate(model, regions, {"base": base, "MS": half}, truth)
+    tolerance_mm = 1e-9
+    assert abs(value["vertex_error_mean_mm", "vermilion", "base"] - 3.0) < tolerance_mm
+    assert abs(value["vertex_error_std_mm", "vermilion", "base"]) < 1e-6
+    assert value["ratio_to_base", "mouth", "MS"] == pytest.approx(0.5, abs=1e-12)
+    # The lips are displaced along z; the surface below is slanted, so that the nearest point is nearer.
+    assert value["surface_error_median_mm", "vermilion", "base"] <= 3.0
+
+
+def test_lips_that_gape_where_truth_touches_are_counted(face):
+    _, regions = face
+    model = sheet_face(gap_mm=0.0)
+    truth = moving(model)
+    gaping = truth.copy()
+    gaping[:, (regions.lips == 1), 1] += 1.6
+    result, value = evaluate(model, regions, {"base": truth, "MS": gaping}, truth)
+    assert value["false_open_rate", "mouth", "base"] == 0.0
+    assert value["false_open_rate", "mouth", "MS"] == 1.0  # two of six frames touch
+    assert result.sums["MS"].sums["mouth.touch_frames"].sum() == 2
+    assert value["aperture_error_mm", "mouth", "MS"] == pytest.approx(1.6, abs=1e-9)
+
+
+def test_jitter_is_that_of_the_result_beyond_the_truth(face):
+    model, regions = face
+    truth = np.repeat(model.neutral_mm[None], len(FRAMES), axis=0)
+    shaken = truth.copy()
+    shaken[:, regions.lips > 0, 2] += 0.1 * np.array([1, -1, 1, -1, 1, -1])[:, None]
+    _, value = evaluate(model, regions, {"base": truth, "MS": shaken}, truth)
+    assert value["jitter_mm", "vermilion", "MS"] == pytest.approx(0.4, abs=1e-9)
+
+
+def test_a_gap_in_the_frames_is_no_second_difference():
+    sequence = np.random.default_rng(0).normal(size=(5, 4, 3))
+    result = second_differences(sequence, np.array([0, 1, 2, 7, 8]))
+    assert np.isfinite(result[1]).all()
+    assert np.isnan(result[[0, 2, 3, 4]]).all()
+
+
+def test_vertices_without_a_counterpart_do_not_count(face):
+    model, regions = face
+    truth = moving(model)
+    base = truth.copy()
+    base[:, regions.lips == 1, 2] += 3.0
+    known = truth.copy()
+    known[:, regions.lips == 1] = np.nan
+    reference = Reference("truth", known, truth, model.triangles)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
+    value = rows.set_index(["measure", "region"])["value"]
+    assert value["vertex_error_mean_mm", "vermilion"] < 1e-9
+
+
+def test_mean_is_weighted_by_area_on_a_graded_mesh():
+    """Vertices crowd on one half of the mesh; the error of the other half counts by its area."""
+    model = sheet_face()
+    crowded = model.neutral_mm.copy()
+    right = crowded[:, 0] > 0
+    crowded[right, 0] *= 0.25
+    regions = regions_of_mask(model, crowded, mouth_triangles(model))
+    truth = np.repeat(crowded[None], len(FRAMES), axis=0)
+    base = truth.copy()
+    inside = regions.weights["mouth"] > 0
+    base[:, right & inside, 2] += 1.0
+    reference = Reference("truth", truth, truth, model.triangles)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
+    value = rows.set_index(["measure", "region"])["value"]["vertex_error_mean_mm", "mouth"]
+    area = vertex_areas(crowded, model.triangles[mouth_triangles(model)])
+    assert value == pytest.approx(area[right].sum() / area.sum(), rel=1e-9)
+    assert value < 0.6 * np.mean(right[inside])
+
+
+def test_reconstruction_is_measured_without_alignment(face):
+    model, regions = face
+    truth = moving(model)
+    reference = Reference("truth", truth, truth, model.triangles)
+    shifted = truth + np.array([0.0, 0.0, 2.0])
+    slid = np.zeros(truth.shape[:2])
+    sums = evaluate_reconstruction(shifted, FRAMES, regions, reference, slid, 2)
+    rows = measure_rows(sums, "s", "t", 6, 200, 0.95, 0).set_index(["measure", "region"])["value"]
+    assert rows["vertex_error_mean_mm", "face"] == pytest.approx(2.0, abs=1e-9)
+    assert rows["drift_mm", "vermilion"] == 0.0
+
+
+def test_joined_takes_weigh_by_their_area_and_frames():
+    a = ClipSums({"mouth.error": np.array([2.0]), "mouth.weight": np.array([1.0])})
+    b = ClipSums({"mouth.error": np.array([3.0]), "mouth.weight": np.array([3.0]), "x": np.ones(1)})
+    both = ClipSums.joined([a, b])
+    assert set(both.sums) == {"mouth.error", "mouth.weight"}
+    assert both.sums["mouth.error"].sum() / both.sums["mouth.weight"].sum() == 1.25
