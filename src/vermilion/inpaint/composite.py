@@ -45,7 +45,11 @@ class Layer:
 
 
 def window_of(
-    domain: LipDomain, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray, margin_px: int
+    domain: LipDomain,
+    camera: Camera,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    margin_px: int,
 ) -> Window | None:
     """The rectangle that the domain's vertices project into; None where outside the picture."""
     pixels = camera.project(vertices_mm[np.unique(triangles[domain.in_domain])])

@@ -58,7 +58,9 @@ def _colour_difference(
 ) -> np.ndarray:
     """Distance of display colours after one gain a channel, slightly smoothed, (h, w)."""
     use = skin if skin.sum() >= 100 else known
-    gain = np.median(plain.rgb[use], axis=0) / np.maximum(np.median(tattooed.rgb[use], axis=0), 1e-4)
+    gain = np.median(plain.rgb[use], axis=0) / np.maximum(
+        np.median(tattooed.rgb[use], axis=0), 1e-4
+    )
     colours = linear_to_srgb(tattooed.rgb * gain) - linear_to_srgb(plain.rgb)
     support = np.maximum(blur(known.astype(np.float32), sigma), 1e-3)
     smooth = blur(np.where(known[..., None], colours, 0), sigma) / support[..., None]

@@ -1,0 +1,91 @@
+"""Does a picture open, decode to its last row, and have the size it should?"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import OpenImageIO as oiio
+
+from vermilion.files import sha256_of
+
+
+@dataclass(frozen=True)
+class ImageFacts:
+    """What a file holds.
+
+    Attributes:
+        file: path relative to the capture.
+        size_bytes, sha256: of the file.
+        width_px, height_px: of the picture.
+        channels: number of channels.
+        bits: bits a channel.
+    """
+
+    file: str
+    size_bytes: int
+    sha256: str
+    width_px: int
+    height_px: int
+    channels: int
+    bits: int
+
+    def as_dict(self) -> dict:
+        return asdict(self)
+
+
+def check_image(
+    path: Path, root: Path, expected_size: tuple[int, int] | None
+) -> tuple[ImageFacts | None, str]:
+    """Read a picture whole.
+
+    Args:
+        path: the file.
+        root: the capture; `ImageFacts.file` is relative to it.
+        expected_size: (width, height), None for any.
+
+    Returns:
+        (facts, "") or (facts or None, reason why the picture cannot be used).
+    """
+    if not path.is_file():
+        return None, "missing"
+    if path.stat().st_size == 0:
+        return None, "empty file"
+    stream = oiio.ImageInput.open(str(path))
+    if not stream:
+        return None, f"unreadable: {_one_line(oiio.geterror())}"
+    spec = stream.spec()
+    pixels = stream.read_image(spec.format)
+    failed = stream.has_error
+    message = _one_line(stream.geterror())
+    stream.close()
+    if pixels is None or failed:
+        return None, f"truncated or damaged{': ' + message if message else ''}"
+    facts = ImageFacts(
+        file=path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name,
+        size_bytes=path.stat().st_size,
+        sha256=sha256_of(path),
+        width_px=spec.width,
+        height_px=spec.height,
+        channels=spec.nchannels,
+        bits=8 * spec.format.size(),
+    )
+    if expected_size is not None and (spec.width, spec.height) != tuple(expected_size):
+        width, height = expected_size
+        return facts, f"size {spec.width}x{spec.height}, expected {width}x{height}"
+    return facts, ""
+
+
+def header_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) from the header alone; None where it cannot be read."""
+    stream = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    if not stream:
+        oiio.geterror()  # clears it
+        return None
+    spec = stream.spec()
+    stream.close()
+    return spec.width, spec.height
+
+
+def _one_line(message: str) -> str:
+    return " ".join(message.split())

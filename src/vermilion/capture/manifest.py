@@ -1,0 +1,278 @@
+"""The manifest of a chunk: every picture with its size and hash, and what is wrong with it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from vermilion.camera import read_cameras
+from vermilion.capture.checks import check_image, header_size
+from vermilion.errors import InputError, describe_problem
+from vermilion.files import atomic_path, sha256_of
+from vermilion.frames import list_frames
+from vermilion.progress import progress
+from vermilion.quality import QualityRow
+from vermilion.video import VIDEO_SUFFIXES, VideoReader
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a chunk of a take holds.
+
+    Attributes:
+        kind: `capture` (folders of frames of named cameras), `frames` (one folder) or `video`.
+        cameras: name -> {width_px, height_px, channels, bits}; the size the pictures should have.
+        frames: camera -> frame -> facts of the file (empty for a video).
+        bad: camera -> frame -> reason.
+        video: facts of the video file, empty otherwise.
+    """
+
+    subject: str
+    take: str
+    source: str
+    kind: str
+    cameras: dict[str, dict] = field(default_factory=dict)
+    frames: dict[str, dict[int, dict]] = field(default_factory=dict)
+    bad: dict[str, dict[int, str]] = field(default_factory=dict)
+    video: dict = field(default_factory=dict)
+
+    def save(self, path: str | Path) -> None:
+        """Write as JSON, sorted, whole or not at all."""
+        content = {"format_version": FORMAT_VERSION, **self.__dict__}
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
+
+
+def load_manifest(path: str | Path) -> Manifest:
+    """Read what `Manifest.save` wrote. Raises InputError on another or damaged file."""
+    try:
+        content = json.loads(Path(path).read_text())
+        version = content.pop("format_version")
+        if version != FORMAT_VERSION:
+            raise ValueError(f"format {version}")
+        for name in ("frames", "bad"):
+            content[name] = {
+                camera: {int(frame): value for frame, value in rows.items()}
+                for camera, rows in content[name].items()
+            }
+        return Manifest(**content)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"an unreadable manifest ({error})",
+            f"a manifest of format {FORMAT_VERSION}",
+            "Remove the file and run again.",
+            path=path,
+        ) from error
+
+
+def capture_manifest(
+    source: str | Path,
+    subject: str,
+    take: str,
+    frames: Sequence[int],
+    take_frames: Sequence[int],
+    cameras: Sequence[str] | None = None,
+    hash_decoded: bool = False,
+) -> Manifest:
+    """Check the pictures of a chunk.
+
+    A picture that is missing, truncated, unreadable or wrongly sized is listed in `bad` and the
+    take goes on.
+
+    Args:
+        source: capture folder, folder of frames, or video file.
+        frames: frame numbers of the chunk.
+        take_frames: frame numbers of the whole take: a camera without any of them is missing.
+        cameras: names to check; all of the rig by default.
+        hash_decoded: also hash the decoded frames of a video.
+
+    Raises:
+        InputError listing everything that stops the take: a camera of the rig without pictures,
+        or whose pictures all disagree with its calibration.
+    """
+    source = Path(source)
+    if source.suffix.lower() in VIDEO_SUFFIXES:
+        return _video_manifest(source, subject, take, frames, cameras, hash_decoded)
+    rig = source / "frames"
+    kind = "capture" if rig.is_dir() else "frames"
+    folders = (
+        {path.name: path for path in sorted(rig.iterdir()) if path.is_dir()} if rig.is_dir() else {}
+    )
+    if not rig.is_dir():
+        folders = {cameras[0] if cameras else "cam": source}
+    sizes = _calibrated_sizes(source)
+    wanted = list(cameras) if cameras else sorted(set(folders) | set(sizes))
+    place = {"subject": subject, "take": take}
+    manifest = Manifest(subject, take, str(source), kind)
+    problems = []
+    for camera in wanted:
+        paths = list_frames(folders[camera]) if camera in folders else {}
+        if not any(frame in paths for frame in take_frames):
+            problems.append(
+                describe_problem(
+                    "no picture of the take",
+                    f"frames {min(take_frames)} to {max(take_frames)}",
+                    "Add the camera's frames, or take it out of the rig.",
+                    camera=camera,
+                    path=folders.get(camera, rig / camera),
+                    **place,
+                )
+            )
+            continue
+        problems += _check_camera(manifest, camera, paths, frames, take_frames, sizes, source)
+    if problems:
+        raise _fatal(problems, source, place)
+    return manifest
+
+
+def _check_camera(
+    manifest: Manifest,
+    camera: str,
+    paths: dict[int, Path],
+    frames: Sequence[int],
+    take_frames: Sequence[int],
+    sizes: dict[str, tuple[int, int]],
+    source: Path,
+) -> list[str]:
+    """Check one camera's pictures of the chunk, filling the manifest; returns fatal problems."""
+    expected = sizes.get(camera)
+    calibrated = expected is not None
+    if not calibrated:
+        known = [header_size(paths[f]) for f in take_frames if f in paths]
+        common = Counter(size for size in known if size is not None).most_common(1)
+        expected = common[0][0] if common else None
+    facts, bad = {}, {}
+    for frame in progress(frames, f"{manifest.subject}/{manifest.take} {camera}"):
+        found, reason = check_image(paths.get(frame, source / "missing"), source, expected)
+        if found is not None:
+            facts[frame] = found.as_dict()
+        if reason:
+            bad[frame] = reason
+    if calibrated and len(bad) == len(frames) and _none_fits(paths, take_frames, expected):
+        width, height = expected
+        found = Counter(header_size(paths[f]) for f in take_frames if f in paths).most_common(1)
+        return [
+            describe_problem(
+                f"pictures of {_times(found[0][0])}",
+                f"{width}x{height}, as the calibration says",
+                "Calibrate again at this size, or export the frames at the calibrated size.",
+                subject=manifest.subject,
+                take=manifest.take,
+                camera=camera,
+                path=next(iter(paths.values())).parent,
+            )
+        ]
+    first = next(iter(facts.values()), {})
+    manifest.cameras[camera] = {
+        "width_px": expected[0] if expected else 0,
+        "height_px": expected[1] if expected else 0,
+        "channels": first.get("channels", 0),
+        "bits": first.get("bits", 0),
+    }
+    manifest.frames[camera] = facts
+    if bad:
+        manifest.bad[camera] = bad
+    return []
+
+
+def _none_fits(
+    paths: dict[int, Path], take_frames: Sequence[int], expected: tuple[int, int]
+) -> bool:
+    return not any(header_size(paths[f]) == expected for f in take_frames if f in paths)
+
+
+def _times(size: tuple[int, int] | None) -> str:
+    return f"{size[0]}x{size[1]}" if size else "no readable size"
+
+
+def _calibrated_sizes(source: Path) -> dict[str, tuple[int, int]]:
+    """Camera -> (width, height) where the capture brings its calibration."""
+    if not (source / "cameras").is_dir():
+        return {}
+    cameras = read_cameras(source / "cameras")
+    return {name: (camera.width_px, camera.height_px) for name, camera in cameras.items()}
+
+
+def _video_manifest(
+    source: Path,
+    subject: str,
+    take: str,
+    frames: Sequence[int],
+    cameras: Sequence[str] | None,
+    hash_decoded: bool,
+) -> Manifest:
+    import hashlib
+
+    reader = VideoReader(source)
+    place = {"subject": subject, "take": take}
+    camera = cameras[0] if cameras else "cam"
+    width, height = reader.size
+    bad, decoded = {}, {}
+    for frame in progress(frames, f"{subject}/{take}"):
+        try:
+            pixels = reader.read(frame, camera=camera, **place)
+        except InputError as error:
+            bad[frame] = _short(error)
+            continue
+        if pixels.shape[:2] != (height, width):
+            bad[frame] = f"size {pixels.shape[1]}x{pixels.shape[0]}, expected {width}x{height}"
+        if hash_decoded:
+            decoded[frame] = {"sha256_rgb8": hashlib.sha256(pixels.tobytes()).hexdigest()}
+    facts = {
+        "file": source.name,
+        "size_bytes": source.stat().st_size,
+        "sha256": sha256_of(source),
+        "frames": reader.n_frames,
+        "fps": reader.fps,
+    }
+    size = {"width_px": width, "height_px": height, "channels": 3, "bits": 8}
+    return Manifest(
+        subject,
+        take,
+        str(source),
+        "video",
+        {camera: size},
+        {camera: decoded} if decoded else {},
+        {camera: bad} if bad else {},
+        facts,
+    )
+
+
+def _short(error: InputError) -> str:
+    """The part of a message after its place."""
+    return str(error).split("found ", 1)[-1].split(";", 1)[0]
+
+
+def _fatal(problems: list[str], source: Path, place: dict) -> InputError:
+    lines = "\n".join(f"  {i}. {problem}" for i, problem in enumerate(problems, start=1))
+    return InputError(
+        f"{len(problems)} problem(s) that stop the take:\n{lines}\n",
+        "every camera of the rig with pictures that fit its calibration",
+        "Mend all of them, then run again.",
+        path=source,
+        **place,
+    )
+
+
+def quality_rows(
+    manifest: Manifest, frames: Sequence[int], needed: Sequence[str] = ()
+) -> list[QualityRow]:
+    """A row a frame: invalid without a `needed` camera or without half of the cameras.
+
+    A frame that lacks some other picture is valid but names it in its reason.
+    """
+    rows = []
+    for frame in frames:
+        lacking = {c: reasons[frame] for c, reasons in manifest.bad.items() if frame in reasons}
+        reason = "; ".join(f"{camera}: {why}" for camera, why in sorted(lacking.items()))
+        usable = len(manifest.cameras) - len(lacking)
+        valid = not (set(lacking) & set(needed)) and usable > 0
+        valid = valid and 2 * usable > len(manifest.cameras)
+        figures = {"cameras": len(manifest.cameras), "cameras_bad": len(lacking)}
+        rows.append(QualityRow(frame, valid, reason, figures))
+    return rows

@@ -1,0 +1,61 @@
+"""Pictures of what the capture stage found: contact sheets, seen against expected corners."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+
+from vermilion.capture.calibrate import Calibration
+from vermilion.draw import draw_points, label, tile, to_display
+
+SEEN, EXPECTED = (60, 220, 60), (255, 60, 60)
+
+
+def contact_sheet(
+    pictures: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
+) -> np.ndarray:
+    """One linear picture a camera with its name, (h, w, 3) uint8; None is drawn as missing."""
+    tiles = []
+    for name, linear in pictures.items():
+        if linear is None:
+            blank = np.full((height_px, height_px, 3), 40, dtype=np.uint8)
+            tiles.append(label(blank, f"{name}: cannot be read"))
+            continue
+        tiles.append(label(_fitted(to_display(linear), height_px), name))
+    return tile(tiles, min(columns, len(tiles)))
+
+
+def calibration_sheet(
+    calibration: Calibration, views: Mapping[str, Mapping[str, np.ndarray]], height_px: int = 480
+) -> np.ndarray:
+    """The worst view of each camera with seen (green) and expected (red) corners.
+
+    Args:
+        views: camera -> moment -> linear picture; only the moment drawn is read.
+    """
+    tiles = []
+    for name in calibration.cameras:
+        residuals = calibration.residuals[name]
+        moment = worst_view(calibration, name)
+        seen, expected = residuals[moment]
+        picture = to_display(views[name][moment])
+        scale = height_px / picture.shape[0]
+        picture = _fitted(picture, height_px)
+        picture = draw_points(picture, seen * scale, SEEN, 3)
+        picture = draw_points(picture, expected * scale, EXPECTED, 1)
+        rms = calibration.camera_reprojection_px[name]
+        tiles.append(label(picture, f"{name} {moment}  {rms:.3f} px"))
+    return tile(tiles, min(4, len(tiles)))
+
+
+def worst_view(calibration: Calibration, camera: str) -> str:
+    """The moment with the largest reprojection error of a camera."""
+    residuals = calibration.residuals[camera]
+    return max(residuals, key=lambda m: float(np.abs(residuals[m][0] - residuals[m][1]).max()))
+
+
+def _fitted(picture: np.ndarray, height_px: int) -> np.ndarray:
+    width = max(1, round(picture.shape[1] * height_px / picture.shape[0]))
+    return cv2.resize(picture, (width, height_px), interpolation=cv2.INTER_AREA)

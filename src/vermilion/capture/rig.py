@@ -1,0 +1,179 @@
+"""The cameras of a take, wherever they come from: given, calibrated from a board, or assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.camera import Camera, pinhole, read_cameras
+from vermilion.capture.board import Board, BoardDetector, Corners
+from vermilion.capture.calibrate import Calibration, calibrate_rig
+from vermilion.capture.manifest import Manifest
+from vermilion.draw import to_display
+from vermilion.errors import InputError, describe_problem
+from vermilion.images import IMAGE_SUFFIXES, read_image
+from vermilion.progress import progress
+
+
+@dataclass(frozen=True)
+class RigCameras:
+    """Calibrated cameras and where they come from.
+
+    Attributes:
+        method: `given`, `charuco`, `checkerboard` or `assumed`.
+        calibration: the calibration where one was made.
+    """
+
+    cameras: dict[str, Camera]
+    method: str
+    calibration: Calibration | None = None
+
+    def summary(self) -> dict:
+        """What `capture/cameras.json` holds."""
+        made = self.calibration
+        return {
+            "calibrated": self.method != "assumed",
+            "method": self.method,
+            "reprojection_px": made.reprojection_px if made else None,
+            "camera_reprojection_px": made.camera_reprojection_px if made else {},
+            "dropped_views": [f"{camera}/{moment}" for camera, moment in made.dropped]
+            if made
+            else [],
+        }
+
+
+def image_sizes(manifests: Sequence[Manifest]) -> dict[str, tuple[int, int]]:
+    """Camera -> (width, height) from a take's manifests.
+
+    Raises InputError where chunks disagree.
+    """
+    sizes: dict[str, set[tuple[int, int]]] = {}
+    for manifest in manifests:
+        for name, facts in manifest.cameras.items():
+            sizes.setdefault(name, set()).add((facts["width_px"], facts["height_px"]))
+    mixed = {name: sorted(found) for name, found in sizes.items() if len(found) > 1}
+    if mixed:
+        raise InputError(
+            f"pictures of several sizes ({mixed})",
+            "one size a camera",
+            "Export the take again at one size.",
+            subject=manifests[0].subject,
+            take=manifests[0].take,
+        )
+    return {name: next(iter(found)) for name, found in sorted(sizes.items())}
+
+
+def rig_cameras(
+    source: str | Path,
+    sizes: dict[str, tuple[int, int]],
+    reference: str,
+    board: Board,
+    model: str = "OPENCV",
+    refine_principal_point: bool = True,
+    max_view_px: float = 2.0,
+    assumed_focal: float = 1.2,
+    **place,
+) -> RigCameras:
+    """Cameras of a take: read from `cameras/`, else calibrated from `calibration/`, else assumed.
+
+    Args:
+        source: capture folder, frame folder or video.
+        sizes: camera -> (width, height) of its pictures.
+        reference: camera whose frame becomes the world of a calibrated rig.
+        assumed_focal: focal length of a single uncalibrated camera, in image widths.
+
+    Raises InputError where several cameras have neither, or the given ones do not fit the pictures.
+    """
+    source = Path(source)
+    if (source / "cameras").is_dir():
+        cameras = read_cameras(source / "cameras")
+        _check_given(cameras, sizes, source, place)
+        return RigCameras({name: cameras[name] for name in sizes}, "given")
+    if (source / "calibration").is_dir():
+        seen = detect_boards(source / "calibration", board, sizes, place)
+        if reference not in sizes:
+            reference = min(sizes)
+        made = calibrate_rig(
+            board, seen, sizes, reference, model, refine_principal_point, max_view_px, **place
+        )
+        return RigCameras(made.cameras, board.kind, made)
+    if len(sizes) == 1:
+        name, (width, height) = next(iter(sizes.items()))
+        return RigCameras({name: pinhole(name, assumed_focal * width, width, height)}, "assumed")
+    raise InputError(
+        f"{len(sizes)} cameras without a calibration",
+        "cameras/ (a COLMAP text model) or calibration/<camera>/ (views of a board)",
+        "Export the rig as COLMAP text, or add ChArUco or checkerboard pictures.",
+        path=source,
+        **place,
+    )
+
+
+def calibration_views(folder: Path, camera: str) -> dict[str, Path]:
+    """Moment -> picture of the board, in order of name."""
+    views = folder / camera
+    paths = sorted(views.iterdir()) if views.is_dir() else []
+    return {path.stem: path for path in paths if path.suffix.lower() in IMAGE_SUFFIXES}
+
+
+def detect_boards(
+    folder: Path, board: Board, sizes: dict[str, tuple[int, int]], place: dict
+) -> dict[str, dict[str, Corners]]:
+    """Corners in every calibration picture of every camera, camera -> moment -> corners.
+
+    Raises InputError listing all pictures that do not have their camera's size.
+    """
+    detector, seen, problems = BoardDetector(board), {}, []
+    for name, size in sizes.items():
+        seen[name] = {}
+        for moment, path in progress(calibration_views(folder, name).items(), f"board in {name}"):
+            linear = read_image(path, camera=name, **place)
+            found = (linear.shape[1], linear.shape[0])
+            if found != tuple(size):
+                problems.append(
+                    describe_problem(
+                        f"a calibration picture of {found[0]}x{found[1]}",
+                        f"{size[0]}x{size[1]}, as the camera's frames",
+                        "Calibrate at the size of the frames.",
+                        camera=name,
+                        path=path,
+                    )
+                )
+                continue
+            grey = np.rint(to_display(linear) @ [0.299, 0.587, 0.114]).astype(np.uint8)
+            seen[name][moment] = detector.detect(grey)
+    if problems:
+        raise InputError(
+            f"{len(problems)} problem(s):\n  " + "\n  ".join(problems) + "\n",
+            "calibration pictures that fit",
+            "Mend all of them, then run again.",
+            path=folder,
+            **place,
+        )
+    return seen
+
+
+def _check_given(
+    cameras: dict[str, Camera], sizes: dict[str, tuple[int, int]], source: Path, place: dict
+) -> None:
+    problems = []
+    for name, (width, height) in sizes.items():
+        if name not in cameras:
+            problems.append(f"camera {name} is not in images.txt")
+        elif (cameras[name].width_px, cameras[name].height_px) != (width, height):
+            given = cameras[name]
+            problems.append(
+                f"camera {name} is calibrated at {given.width_px}x{given.height_px}, its pictures "
+                f"are {width}x{height}"
+            )
+    if problems:
+        raise InputError(
+            "; ".join(problems),
+            "a calibration of every camera at the size of its pictures",
+            "Correct cameras/, or export the frames at the calibrated size.",
+            path=source / "cameras",
+            **place,
+        )

@@ -1,0 +1,105 @@
+"""Configuration of the capture stage: checks and calibration."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vermilion.config.base import StageConfig
+
+
+class ManifestConfig(StageConfig):
+    """What is recorded of the pictures."""
+
+    hash_decoded: bool = Field(
+        False,
+        description="Also record the SHA-256 of each decoded frame of a video file (slower).",
+    )
+
+
+class CalibrationConfig(StageConfig):
+    """Calibration from pictures of a board, for captures without `cameras/`."""
+
+    board: Literal["charuco", "checkerboard"] = Field(
+        "charuco", description="Kind of the calibration board."
+    )
+    squares: tuple[int, int] = Field(
+        (9, 7), description="Squares of the board in a row and in a column (count)."
+    )
+    square_mm: float = Field(20.0, gt=0, le=1000, description="Edge of a square (mm).")
+    marker_mm: float = Field(
+        15.0, gt=0, le=1000, description="Edge of a marker, ChArUco only (mm); less than a square."
+    )
+    dictionary: str = Field(
+        "DICT_4X4_50",
+        pattern="^DICT_[A-Za-z0-9_]+$",
+        description="Marker dictionary, ChArUco only, as `cv2.aruco` names it.",
+    )
+    legacy_pattern: bool = Field(
+        False, description="The board was printed with OpenCV before 4.6 (ChArUco only)."
+    )
+    camera_model: Literal["PINHOLE", "OPENCV"] = Field(
+        "OPENCV",
+        description="COLMAP camera model: `PINHOLE`, or `OPENCV` with two radial and two tangential "
+        "distortion terms.",
+    )
+    refine_principal_point: bool = Field(
+        True, description="Estimate the principal point; otherwise it is the middle of the picture."
+    )
+    max_view_px: float = Field(
+        2.0, gt=0, le=50, description="Board views with a larger RMS error are left out (pixels)."
+    )
+    assumed_focal: float = Field(
+        1.2,
+        ge=0.3,
+        le=10,
+        description="Focal length of a single camera without calibration (image widths).",
+    )
+
+    @field_validator("squares")
+    @classmethod
+    def _at_least_three(cls, squares: tuple[int, int]) -> tuple[int, int]:
+        if min(squares) < 3:
+            raise ValueError("a board has at least 3 squares a side")
+        return squares
+
+    @field_validator("dictionary")
+    @classmethod
+    def _known_dictionary(cls, name: str) -> str:
+        import cv2
+
+        if not hasattr(cv2.aruco, name):
+            raise ValueError(f"cv2.aruco has no dictionary {name}; for example DICT_4X4_50")
+        return name
+
+    @model_validator(mode="after")
+    def _board_is_possible(self) -> CalibrationConfig:
+        if self.board == "charuco" and self.marker_mm >= self.square_mm:
+            raise ValueError(
+                f"marker_mm is {self.marker_mm}; a marker must be smaller than its square "
+                f"({self.square_mm} mm)"
+            )
+        if self.board == "checkerboard" and sum(self.squares) % 2 == 0:
+            raise ValueError(
+                f"a checkerboard of {self.squares[0]} x {self.squares[1]} squares looks the same "
+                "upside down; use one with an odd and an even side, or a ChArUco board"
+            )
+        return self
+
+
+class CaptureConfig(StageConfig):
+    """Checks of captures and calibration of their cameras (Lips16 3.1)."""
+
+    frontal_camera: str = Field(
+        "face2",
+        min_length=1,
+        description="Camera of a multi-view take that stands for the monocular video; the world of a "
+        "rig calibrated here is its frame.",
+    )
+    manifest: ManifestConfig = Field(
+        default_factory=ManifestConfig, description="What is recorded of the pictures."
+    )
+    calibration: CalibrationConfig = Field(
+        default_factory=CalibrationConfig, description="Calibration from pictures of a board."
+    )

@@ -1,0 +1,100 @@
+"""Captures as they come (Lips16 3.1): checked pictures and calibrated cameras of every take."""
+
+from functools import cache
+
+from vermilion.frames import list_frames
+from vermilion.images import IMAGE_SUFFIXES
+from vermilion.video import VIDEO_SUFFIXES
+
+
+@cache
+def capture_files(source):
+    """Frame -> pictures of that frame, of a capture folder or a folder of frames."""
+    rig = Path(source) / "frames"
+    folders = sorted(rig.glob("*/")) if rig.is_dir() else [Path(source)]
+    files = {}
+    for folder in folders:
+        for frame, path in list_frames(folder).items():
+            files.setdefault(frame, []).append(str(path))
+    return files
+
+
+def camera_files(source):
+    """The calibration that a capture brings: COLMAP text, or pictures of a board."""
+    source = Path(source)
+    if (source / "cameras").is_dir():
+        return sorted(str(path) for path in (source / "cameras").glob("*.txt"))
+    views = source.glob("calibration/*/*")
+    return sorted(str(path) for path in views if path.suffix.lower() in IMAGE_SUFFIXES)
+
+
+def capture_inputs(wildcards):
+    """Pictures of a chunk that exist, and the calibration; a missing picture is the job's to name."""
+    take = take_of(wildcards)
+    if take.source == STUDIO:
+        return studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
+    if Path(take.source).suffix.lower() in VIDEO_SUFFIXES:
+        return [take.source]
+    files = capture_files(take.source)
+    pictures = [path for frame in frames_in(wildcards.chunk) for path in files.get(frame, [])]
+    return pictures + camera_files(take.source)
+
+
+def camera_inputs(wildcards):
+    """The calibration of a take: its files, or what the studio writes beside its pictures."""
+    if take_of(wildcards).source == STUDIO:
+        return studio_cameras(wildcards.subject, wildcards.take)
+    return camera_files(source_of(wildcards))
+
+
+rule capture:
+    """Checks every picture of a chunk whole: capture/{chunk}.json, quality rows, contact sheet."""
+    input:
+        capture_inputs,
+    output:
+        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
+        quality=R + "/takes/{subject}/{take}/capture/quality/{chunk}.tsv",
+        overlay=R + "/takes/{subject}/{take}/capture/overlay/{chunk}.png",
+    log:
+        R + "/logs/capture/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/capture/{subject}-{take}-{chunk}.tsv"
+    params:
+        cfg=cfg_of("capture.manifest"),
+        code=code_of("capture_manifest"),
+        source=source_of,
+        camera=mono_camera,
+        multiview=lambda wildcards: take_of(wildcards).is_multiview,
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+        first=lambda wildcards: take_of(wildcards).first,
+        last=lambda wildcards: take_of(wildcards).last,
+    resources:
+        mem_mb=800,
+        runtime=60,
+    script:
+        "../scripts/capture_manifest.py"
+
+
+rule cameras:
+    """Reads, calibrates or assumes the cameras of a take: cameras/ (COLMAP text), cameras.json."""
+    input:
+        calibration=camera_inputs,
+        manifests=per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+    output:
+        cameras=directory(R + "/takes/{subject}/{take}/cameras"),
+        summary=R + "/takes/{subject}/{take}/capture/cameras.json",
+        overlay=R + "/takes/{subject}/{take}/capture/overlay/cameras.png",
+    log:
+        R + "/logs/cameras/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/cameras/{subject}-{take}.tsv"
+    params:
+        cfg=cfg_of("capture.calibration"),
+        code=code_of("cameras"),
+        camera=mono_camera,
+        neutral=lambda wildcards: take_of(wildcards).first,
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    script:
+        "../scripts/cameras.py"
