@@ -1,0 +1,84 @@
+"""The configuration is checked as a whole, before any job runs; what is generated is up to date."""
+
+import difflib
+
+import pytest
+import yaml
+
+from vermilion.config.load import load_configuration
+from vermilion.config.reference import generated_files
+from vermilion.config.takes import STUDIO
+from vermilion.errors import ConfigurationError
+
+from .conftest import ROOT
+
+
+@pytest.mark.parametrize("name", ["config", "tiny", "sample"])
+def test_examples_are_valid(name, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    raw = yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text())
+    _, takes = load_configuration(raw, f"{name}.yaml", check_disk=False)
+    assert takes
+    if name != "sample":
+        assert {take.source for take in takes} == {STUDIO}
+
+
+def test_sample_takes_exist(monkeypatch, data_root):
+    monkeypatch.chdir(ROOT)
+    raw = yaml.safe_load((ROOT / "config" / "sample.yaml").read_text())
+    if not (ROOT / "../shared/data").resolve().samefile(data_root):
+        pytest.skip("config/sample.yaml names ../shared/data, the data lie elsewhere")
+    load_configuration(raw, "sample.yaml", check_disk=True)
+
+
+def test_problems_of_both_files_are_listed_at_once(tmp_path):
+    sheet = tmp_path / "takes.tsv"
+    sheet.write_text(
+        "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\n"
+        "anna\trom\ttattoo\tstudio\t0\t9\t30\ttrain\n"
+        f"anna\tshot\tvideo\t{tmp_path}/no.mp4\t0\t9\t25\tnone\n"
+    )
+    raw = {
+        "takes": str(sheet),
+        "chunk_frames": 0,
+        "tranining": {},
+        "capture": {"frontal_camera": 3},
+    }
+    with pytest.raises(ConfigurationError) as error:
+        load_configuration(raw, "mine.yaml")
+    text = str(error.value)
+    assert "mine.yaml, key chunk_frames: found 0" in text
+    assert "mine.yaml, key tranining: found an unknown key" in text
+    assert "mine.yaml, key capture.frontal_camera: found 3" in text
+    assert "take anna/rom: found 0 `plain` takes" in text
+    assert f"found no '{tmp_path}/no.mp4'" in text
+
+
+def test_takes_that_are_named_must_exist(tmp_path):
+    sheet = tmp_path / "takes.tsv"
+    sheet.write_text(
+        "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\n"
+        "anna\tshot\tvideo\tstudio\t0\t9\t25\tnone\n"
+    )
+    raw = {
+        "takes": str(sheet),
+        "apply": {"takes": ["anna/other"]},
+        "studio": {"subjects": {"berta": {}}},
+    }
+    with pytest.raises(ConfigurationError) as error:
+        load_configuration(raw, "mine.yaml")
+    text = str(error.value)
+    assert "key apply.takes: found 'anna/other'" in text
+    assert "studio.subjects: found ['berta']; expected also 'anna'" in text
+    assert "studio.subjects.berta: found a subject without takes" in text
+
+
+@pytest.mark.parametrize("name", sorted(generated_files()))
+def test_generated_files_are_up_to_date(name):
+    path = ROOT / name
+    stored = path.read_text() if path.is_file() else ""
+    expected = generated_files()[name]
+    difference = difflib.unified_diff(
+        stored.splitlines(), expected.splitlines(), name, "generated", lineterm=""
+    )
+    assert stored == expected, "run `make docs`:\n" + "\n".join(difference)
