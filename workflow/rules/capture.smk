@@ -59,6 +59,9 @@ rule capture:
         R + "/logs/capture/{subject}-{take}-{chunk}.log",
     benchmark:
         R + "/benchmarks/capture/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=800,
+        runtime=60,
     params:
         cfg=cfg_of("capture.manifest"),
         code=code_of("capture_manifest"),
@@ -66,11 +69,6 @@ rule capture:
         camera=mono_camera,
         multiview=lambda wildcards: take_of(wildcards).is_multiview,
         frames=lambda wildcards: frames_in(wildcards.chunk),
-        first=lambda wildcards: take_of(wildcards).first,
-        last=lambda wildcards: take_of(wildcards).last,
-    resources:
-        mem_mb=800,
-        runtime=60,
     script:
         "../scripts/capture_manifest.py"
 
@@ -88,13 +86,13 @@ rule cameras:
         R + "/logs/cameras/{subject}-{take}.log",
     benchmark:
         R + "/benchmarks/cameras/{subject}-{take}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
     params:
         cfg=cfg_of("capture.calibration"),
         code=code_of("cameras"),
         camera=mono_camera,
         neutral=lambda wildcards: take_of(wildcards).first,
-    resources:
-        mem_mb=1500,
-        runtime=60,
     script:
         "../scripts/cameras.py"

@@ -30,7 +30,6 @@ def main(snakemake):
         subject,
         take,
         frames,
-        range(snakemake.params.first, snakemake.params.last + 1),
         None if snakemake.params.multiview else [camera],
         hash_decoded=snakemake.params.cfg["capture.manifest"]["hash_decoded"],
     )

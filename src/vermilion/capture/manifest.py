@@ -75,7 +75,6 @@ def capture_manifest(
     subject: str,
     take: str,
     frames: Sequence[int],
-    take_frames: Sequence[int],
     cameras: Sequence[str] | None = None,
     hash_decoded: bool = False,
 ) -> Manifest:
@@ -87,7 +86,6 @@ def capture_manifest(
     Args:
         source: capture folder, folder of frames, or video file.
         frames: frame numbers of the chunk.
-        take_frames: frame numbers of the whole take: a camera without any of them is missing.
         cameras: names to check; all of the rig by default.
         hash_decoded: also hash the decoded frames of a video.
 
@@ -112,11 +110,11 @@ def capture_manifest(
     problems = []
     for camera in wanted:
         paths = list_frames(folders[camera]) if camera in folders else {}
-        if not any(frame in paths for frame in take_frames):
+        if not paths:
             problems.append(
                 describe_problem(
-                    "no picture of the take",
-                    f"frames {min(take_frames)} to {max(take_frames)}",
+                    "no picture",
+                    "numbered frames of every camera of the rig",
                     "Add the camera's frames, or take it out of the rig.",
                     camera=camera,
                     path=folders.get(camera, rig / camera),
@@ -124,7 +122,7 @@ def capture_manifest(
                 )
             )
             continue
-        problems += _check_camera(manifest, camera, paths, frames, take_frames, sizes, source)
+        problems += _check_camera(manifest, camera, paths, frames, sizes, source)
     if problems:
         raise _fatal(problems, source, place)
     return manifest
@@ -135,7 +133,6 @@ def _check_camera(
     camera: str,
     paths: dict[int, Path],
     frames: Sequence[int],
-    take_frames: Sequence[int],
     sizes: dict[str, tuple[int, int]],
     source: Path,
 ) -> list[str]:
@@ -143,7 +140,7 @@ def _check_camera(
     expected = sizes.get(camera)
     calibrated = expected is not None
     if not calibrated:
-        known = [header_size(paths[f]) for f in take_frames if f in paths]
+        known = [header_size(path) for path in paths.values()]
         common = Counter(size for size in known if size is not None).most_common(1)
         expected = common[0][0] if common else None
     facts, bad = {}, {}
@@ -153,9 +150,9 @@ def _check_camera(
             facts[frame] = found.as_dict()
         if reason:
             bad[frame] = reason
-    if calibrated and len(bad) == len(frames) and _none_fits(paths, take_frames, expected):
+    if calibrated and len(bad) == len(frames) and _none_fits(paths, expected):
         width, height = expected
-        found = Counter(header_size(paths[f]) for f in take_frames if f in paths).most_common(1)
+        found = Counter(header_size(path) for path in paths.values()).most_common(1)
         return [
             describe_problem(
                 f"pictures of {_times(found[0][0])}",
@@ -180,10 +177,8 @@ def _check_camera(
     return []
 
 
-def _none_fits(
-    paths: dict[int, Path], take_frames: Sequence[int], expected: tuple[int, int]
-) -> bool:
-    return not any(header_size(paths[f]) == expected for f in take_frames if f in paths)
+def _none_fits(paths: dict[int, Path], expected: tuple[int, int]) -> bool:
+    return not any(header_size(path) == expected for path in paths.values())
 
 
 def _times(size: tuple[int, int] | None) -> str:
