@@ -1,0 +1,118 @@
+"""Configuration of the tracking stage: what is typical of landmarks, faces and heads."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class LandmarkGroups(StageConfig):
+    """One number for each part of the face, as a fraction of the inter-ocular distance."""
+
+    jaw: float = Field(0.05, gt=0, le=1, description="Jaw line (inter-ocular distances).")
+    brows: float = Field(0.03, gt=0, le=1, description="Brows (inter-ocular distances).")
+    nose: float = Field(0.02, gt=0, le=1, description="Nose (inter-ocular distances).")
+    eyes: float = Field(0.015, gt=0, le=1, description="Eyes (inter-ocular distances).")
+    mouth: float = Field(0.015, gt=0, le=1, description="Mouth (inter-ocular distances).")
+
+
+class ModelFitConfig(StageConfig):
+    """How much landmarks, and how much blend weights, are trusted."""
+
+    noise: LandmarkGroups = Field(
+        default_factory=LandmarkGroups,
+        description="Deviation of a detected landmark from one frame to another.",
+    )
+    robust_sigmas: float = Field(
+        3.0, gt=0.5, le=100, description="A landmark this far off counts half (deviations)."
+    )
+    weight_sigma: float = Field(
+        0.5, gt=0.01, le=100, description="Deviation of a blend weight about zero."
+    )
+    jaw_slide: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="How far the place along the jaw line counts: 0, it slides freely; 1, fully.",
+    )
+
+
+class IdentityConfig(StageConfig):
+    """The person, from a few frames of all of a subject's takes."""
+
+    frames: int = Field(
+        16, ge=1, le=200, description="Frames of all takes together, evenly spread (count)."
+    )
+    bias: LandmarkGroups = Field(
+        default_factory=lambda: LandmarkGroups(
+            jaw=0.08, brows=0.05, nose=0.04, eyes=0.04, mouth=0.04
+        ),
+        description="Deviation of the person's landmarks, as the detector sees them, from the "
+        "model's, the same in all frames.",
+    )
+    neutral_weight_sigma: float = Field(
+        0.03,
+        gt=0.001,
+        le=1,
+        description="Deviation of the blend weights in the first frame of a multi-view take, "
+        "which is the neutral.",
+    )
+    focal_sigma: float = Field(
+        0.3,
+        gt=0.001,
+        le=2,
+        description="Deviation of the logarithm of an unknown focal length about the assumed one.",
+    )
+
+
+class MotionConfig(StageConfig):
+    """Pose and blend weights of each frame (Mono13 6)."""
+
+    rotation_acceleration_deg: float = Field(
+        400.0,
+        gt=0,
+        le=1e9,
+        description="Typical angular acceleration of a head (degrees per second squared); smaller "
+        "is smoother.",
+    )
+    translation_acceleration_mm: float = Field(
+        600.0,
+        gt=0,
+        le=1e9,
+        description="Typical acceleration of a head (mm per second squared); smaller is smoother.",
+    )
+    weight_acceleration: float = Field(
+        60.0,
+        gt=0,
+        le=1e9,
+        description="Typical acceleration of a blend weight (per second squared); smaller is "
+        "smoother.",
+    )
+    iterations: int = Field(15, ge=1, le=200, description="Gauss-Newton steps, at most (count).")
+    max_reprojection: float = Field(
+        0.12,
+        gt=0,
+        le=2,
+        description="Frames whose landmarks miss the model by more are flagged (inter-ocular "
+        "distances, root mean square).",
+    )
+
+
+class MeshesConfig(StageConfig):
+    """The mesh sequence and its overlays."""
+
+    overlay_frames: int = Field(
+        6, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+    )
+
+
+class TrackingConfig(StageConfig):
+    """The coarse monocular track (Lips16 3.2, Mono13 6)."""
+
+    fit: ModelFitConfig = Field(
+        default_factory=ModelFitConfig, description="Trust in landmarks and blend weights."
+    )
+    identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
+    motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
+    meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")

@@ -1,0 +1,28 @@
+"""Settings of the fits from plain values, as a configuration section holds them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vermilion.tracking.expression import FitSettings
+from vermilion.tracking.identity import IdentitySettings
+from vermilion.tracking.observation import LandmarkNoise
+
+
+def fit_settings(fit: dict[str, Any], motion: dict[str, Any] | None = None) -> FitSettings:
+    """Of the sections `tracking.fit` and `tracking.motion`."""
+    motion = {k: v for k, v in (motion or {}).items() if k != "max_reprojection"}
+    noise = LandmarkNoise(**fit["noise"], robust_sigmas=fit["robust_sigmas"])
+    return FitSettings(
+        noise=noise, weight_sigma=fit["weight_sigma"], jaw_slide=fit["jaw_slide"], **motion
+    )
+
+
+def identity_settings(fit: dict[str, Any], identity: dict[str, Any]) -> IdentitySettings:
+    """Of the sections `tracking.fit` and `tracking.identity`."""
+    return IdentitySettings(
+        fit=fit_settings(fit),
+        bias=LandmarkNoise(**identity["bias"]),
+        neutral_weight_sigma=identity["neutral_weight_sigma"],
+        focal_sigma=identity["focal_sigma"],
+    )
