@@ -32,8 +32,8 @@ class Correspondence:
         mask: (M,) int32 ids of the C triangles of the correction layer.
         rigid: (V,) bool, bound C vertices outside the mask by which heads are aligned.
         accurate_triangles: (T_H, 3) int32 topology of H.
+        coarse_triangles: (T, 3) int32 topology of C.
         coarse_neutral_mm: (V, 3) C at the neutral, in its head frame.
-        topology: hash of C's topology (`topology_hash`).
     """
 
     vertices: SurfaceMap
@@ -42,8 +42,13 @@ class Correspondence:
     mask: np.ndarray
     rigid: np.ndarray
     accurate_triangles: np.ndarray
+    coarse_triangles: np.ndarray
     coarse_neutral_mm: np.ndarray
-    topology: str
+
+    @property
+    def topology(self) -> str:
+        """Hash of C's topology; layers and regressors of another one do not fit."""
+        return topology_hash(self.coarse_triangles)
 
     def on_coarse(self, accurate_mm: np.ndarray) -> np.ndarray:
         """H on the topology of C: (..., V_H, 3) -> (..., V, 3) float64, NaN where H is absent."""
@@ -62,8 +67,8 @@ class Correspondence:
                 mask=self.mask.astype(np.int32),
                 rigid=self.rigid,
                 accurate_triangles=self.accurate_triangles.astype(np.int32),
+                coarse_triangles=self.coarse_triangles.astype(np.int32),
                 coarse_neutral_mm=self.coarse_neutral_mm.astype(np.float64),
-                topology=self.topology,
             )
 
     @classmethod
@@ -94,8 +99,8 @@ class Correspondence:
             mask=arrays["mask"],
             rigid=arrays["rigid"],
             accurate_triangles=arrays["accurate_triangles"],
+            coarse_triangles=arrays["coarse_triangles"],
             coarse_neutral_mm=arrays["coarse_neutral_mm"],
-            topology=str(arrays["topology"]),
         )
 
 
@@ -184,8 +189,8 @@ def find_correspondence(
         mask=mask,
         rigid=rest,
         accurate_triangles=accurate.triangles,
+        coarse_triangles=coarse.triangles,
         coarse_neutral_mm=coarse.vertices_mm,
-        topology=topology_hash(coarse.triangles),
     )
     return correspondence, registered
 

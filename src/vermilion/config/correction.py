@@ -1,0 +1,47 @@
+"""Configuration of the correction layer and of its integration."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class LayersConfig(StageConfig):
+    """Layers of the takes with an accurate mesh (Lips16 4.2)."""
+
+    head: Literal["frame", "neutral"] = Field(
+        "frame",
+        description="How the accurate mesh is brought into the coarse mesh's head frame. `frame`: "
+        "aligned to the coarse mesh on the rigid region in every frame. `neutral`: its own head "
+        "motion removed on that region, then aligned to the coarse mesh once, at the neutral.",
+    )
+    max_alignment_mm: float = Field(
+        6.0,
+        gt=0.0,
+        le=50.0,
+        description="A frame is flagged where the aligned rigid regions differ by more (RMS, mm).",
+    )
+
+
+class IntegrationConfig(StageConfig):
+    """From layers to vertices: deformation transfer (Sumner and Popovic 2004)."""
+
+    seam_mm: float = Field(
+        8.0,
+        ge=0.0,
+        le=50.0,
+        description="Width of the ring outside the mask that may give way, so that the border shows "
+        "no crease (mm); 0 fixes everything outside.",
+    )
+
+
+class CorrectionConfig(StageConfig):
+    """The correction layer (Lips16 4.2)."""
+
+    layers: LayersConfig = Field(default_factory=LayersConfig, description="Making layers.")
+    integration: IntegrationConfig = Field(
+        default_factory=IntegrationConfig, description="Applying layers."
+    )

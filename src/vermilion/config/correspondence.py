@@ -1,0 +1,56 @@
+"""Configuration of the correspondence between the coarse and the accurate mesh."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class CorrespondenceConfig(StageConfig):
+    """Laplacian registration of the two neutrals, once a subject (Lips16 4.1)."""
+
+    landmarks: Literal["picture", "model"] = Field(
+        "picture",
+        description="What ties the two neutrals together first. `picture`: the landmarks of the "
+        "frontal picture, carried onto both meshes along their rays (the paper's way). `model`: the "
+        "landmark vertices of the template and of the tracker's model.",
+    )
+    landmark_weight: float = Field(
+        0.3, gt=0.0, le=100.0, description="Weight of a landmark beside bending (1/mm^2)."
+    )
+    smoothing_lengths_mm: list[float] = Field(
+        [20.0, 12.0, 8.0, 5.0, 5.0],
+        min_length=1,
+        description="One dense step each: differences of the two surfaces narrower than this are "
+        "smoothed away (mm).",
+    )
+    search_distance_mm: float = Field(
+        10.0,
+        gt=0.0,
+        le=100.0,
+        description="Farther closest points do not pull at the registration (mm).",
+    )
+    max_distance_mm: float = Field(
+        4.0,
+        gt=0.0,
+        le=50.0,
+        description="A vertex farther than this from the accurate mesh, once registered, has no "
+        "counterpart (mm).",
+    )
+    max_angle_deg: float = Field(
+        70.0,
+        gt=0.0,
+        lt=90.0,
+        description="Largest angle between the normals of a vertex and of its counterpart "
+        "(degrees).",
+    )
+    mask_radius_mm: float = Field(
+        65.0,
+        gt=10.0,
+        le=150.0,
+        description="Reach of the correction layer from the middle of the mouth (mm). The face "
+        "outside stays where the tracker put it, which bounds what a correction can gain.",
+    )

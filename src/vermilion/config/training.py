@@ -1,0 +1,55 @@
+"""Configuration of the regressors and of their selection."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class TrainingConfig(StageConfig):
+    """Regressors from features to correction layers (Lips16 5.2)."""
+
+    prototype_stride: int = Field(
+        10, ge=1, le=1000, description="Every how many training frames become a prototype (frames)."
+    )
+    prototype_minimum: int = Field(
+        20,
+        ge=1,
+        le=10_000,
+        description="At least so many prototypes where there are as many frames: the stride is "
+        "shortened for short takes.",
+    )
+    scaling: Literal["group", "feature"] = Field(
+        "group",
+        description="What shares a scale. `group`: the shape coefficients, and the distances, each "
+        "keep their own proportions. `feature`: every feature has the same variance.",
+    )
+    alphas: list[Positive] = Field(
+        [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0],
+        min_length=1,
+        description="Ridge parameters of the RBF network that cross-validation tries.",
+    )
+    betas: list[Positive] = Field(
+        [0.03, 0.1, 0.3, 1.0, 3.0],
+        min_length=1,
+        description="Scales of the Gaussians that cross-validation tries, per squared distance of "
+        "features scaled to a total variance of 1.",
+    )
+    affine_alphas: list[Positive] = Field(
+        [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0],
+        min_length=1,
+        description="Tikhonov parameters of the affine regressor that cross-validation tries.",
+    )
+    folds: int = Field(5, ge=2, le=50, description="Folds of the cross-validation.")
+    clip_frames: int = Field(
+        30,
+        ge=1,
+        le=10_000,
+        description="Length of the clips that are held out whole (frames); shorter where there are "
+        "too few frames for the folds.",
+    )

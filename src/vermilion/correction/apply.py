@@ -1,0 +1,105 @@
+"""Corrected meshes of a take: the interface for evaluation, application and propagation.
+
+    corrected = correct_sequence(model, coarse_mm, triangles, neutral_mm, rotation, translation_mm,
+                                 features, valid=valid, seam_mm=8.0)          # (F, V, 3) world, mm
+
+`model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
+**C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
+`neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`), which only sets the
+weights of the integration; `features` (F, M) are those of the take. For known layers (the oracle):
+
+    corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
+                                    translation_mm, valid=valid, seam_mm=8.0)
+
+Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
+correct several stretches of one person, make one `LayerIntegrator` and use `Corrector`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.correction.head import head_from_world, world_from_head
+from vermilion.correction.integration import LayerIntegrator
+from vermilion.regression.model import LipModel
+
+BLOCK = 16  # frames solved together: enough to use the cache, little enough to stay in it
+
+
+class Corrector:
+    """A regressor bound to a person's mesh: factors once, corrects any number of frames."""
+
+    def __init__(
+        self,
+        model: LipModel,
+        neutral_mm: np.ndarray,
+        triangles: np.ndarray,
+        seam_mm: float = 8.0,
+    ):
+        model.check_topology(triangles)
+        self.model = model
+        self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm)
+
+    def correct(self, coarse_mm: np.ndarray, features: np.ndarray) -> np.ndarray:
+        """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame."""
+        corrected = np.array(coarse_mm, dtype=np.float64)
+        for first in range(0, len(corrected), BLOCK):
+            part = slice(first, first + BLOCK)
+            layers = self.model.predict_frames_last(features[part])
+            corrected[part, self.integrator.free] += self.integrator.displacements(
+                corrected[part], layers
+            )
+        return corrected
+
+
+def correct_sequence(
+    model: LipModel,
+    coarse_mm: np.ndarray,
+    triangles: np.ndarray,
+    neutral_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    features: np.ndarray,
+    *,
+    valid: np.ndarray | None = None,
+    seam_mm: float = 8.0,
+) -> np.ndarray:
+    """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
+
+    Raises ModelFileError where the mesh is not the one that the regressor was trained on.
+    """
+    corrector = Corrector(model, neutral_mm, triangles, seam_mm)
+    usable = np.isfinite(features).all(axis=1) & np.isfinite(coarse_mm).all(axis=(1, 2))
+    if valid is not None:
+        usable &= valid
+    head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
+    corrected = np.array(coarse_mm, dtype=np.float64)
+    corrected[usable] = world_from_head(
+        corrector.correct(head, features[usable]), rotation[usable], translation_mm[usable]
+    )
+    return corrected
+
+
+def correct_with_layers(
+    mask: np.ndarray,
+    layers: np.ndarray,
+    coarse_mm: np.ndarray,
+    triangles: np.ndarray,
+    neutral_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    *,
+    valid: np.ndarray | None = None,
+    seam_mm: float = 8.0,
+) -> np.ndarray:
+    """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,)."""
+    usable = np.isfinite(coarse_mm).all(axis=(1, 2))
+    if valid is not None:
+        usable &= valid
+    integrator = LayerIntegrator(neutral_mm, triangles, mask, seam_mm)
+    head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
+    corrected = np.array(coarse_mm, dtype=np.float64)
+    corrected[usable] = world_from_head(
+        integrator.integrate(head, layers[usable], BLOCK), rotation[usable], translation_mm[usable]
+    )
+    return corrected

@@ -1,0 +1,82 @@
+"""Correction layers of a stretch of a take (Lips16 4.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from vermilion.correction.head import align_frames, head_from_world
+from vermilion.correction.layers import correction_layers
+from vermilion.correspondence.correspondence import Correspondence
+
+
+@dataclass(frozen=True)
+class TakeLayers:
+    """Layers and what they say of themselves.
+
+    Attributes:
+        layers: (F, T, 9) float32 over the correspondence's mask; zero where not valid.
+        coarse_mm, accurate_mm: (F, V, 3) C and H on C's topology, head frame.
+        valid: (F,) bool.
+        alignment_mm: (F,) RMS of the rigid regions against each other.
+        strength: (F,) RMS of the layer's entries.
+        folded: (F,) share of the mask's triangles turned by over a right angle.
+    """
+
+    layers: np.ndarray
+    coarse_mm: np.ndarray
+    accurate_mm: np.ndarray
+    valid: np.ndarray
+    alignment_mm: np.ndarray
+    strength: np.ndarray
+    folded: np.ndarray
+
+
+def take_layers(
+    correspondence: Correspondence,
+    accurate_mm: np.ndarray,
+    coarse_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    *,
+    head: Literal["frame", "neutral"] = "frame",
+    accurate_neutral_mm: np.ndarray | None = None,
+) -> TakeLayers:
+    """Layers that turn **C** into **H**, free of head motion.
+
+    Args:
+        accurate_mm: (F, V_H, 3) H, world.
+        coarse_mm: (F, V, 3) C, world.
+        rotation, translation_mm: (F, 3, 3), (F, 3), the tracker's `world_from_head`.
+        head: `frame` aligns H to C on the rigid region in every frame; `neutral` aligns H to its
+            own neutral, and that to C's neutral once.
+        accurate_neutral_mm: (V_H, 3), needed for `neutral`.
+    """
+    coarse = head_from_world(coarse_mm, rotation, translation_mm)
+    accurate = correspondence.on_coarse(np.asarray(accurate_mm))
+    rigid = correspondence.rigid
+    if head == "frame":
+        accurate, alignment_mm = align_frames(accurate, coarse, rigid)
+    else:
+        neutral = correspondence.on_coarse(accurate_neutral_mm)
+        neutral, _ = align_frames(neutral[None], correspondence.coarse_neutral_mm, rigid)
+        accurate, alignment_mm = align_frames(accurate, neutral[0], rigid)
+    triangles = correspondence.coarse_triangles[correspondence.mask]
+    corners = np.unique(triangles)
+    valid = np.isfinite(accurate[:, corners]).all(axis=(1, 2))
+    valid &= np.isfinite(coarse).all(axis=(1, 2))
+    layers = np.zeros((len(coarse), len(triangles), 9), dtype=np.float32)
+    for f in np.flatnonzero(valid):
+        layers[f] = correction_layers(coarse[f], accurate[f], triangles)
+    turn = np.linalg.norm(layers[..., :3], axis=-1)
+    return TakeLayers(
+        layers=layers,
+        coarse_mm=coarse,
+        accurate_mm=accurate,
+        valid=valid,
+        alignment_mm=alignment_mm,
+        strength=np.sqrt((layers.astype(np.float64) ** 2).mean(axis=(1, 2))),
+        folded=(turn > np.pi / 2).mean(axis=1),
+    )

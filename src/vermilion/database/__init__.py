@@ -1,0 +1,1 @@
+"""The training database: features and correction layers of all subjects in one HDF5."""

@@ -1,0 +1,115 @@
+"""Reading the database."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry, TrainingSet
+from vermilion.errors import InputError
+
+
+class LipDatabase:
+    """`lips.h5`, open for reading; use as a context manager.
+
+    Attributes:
+        triangles: (T, 3) int32 topology of the coarse mesh.
+        topology: its hash.
+        mask: (M,) int32 ids of the triangles that the layers cover.
+        area_mm2: (M,) mean area of each over the subjects' neutrals.
+        feature_names: names of the features.
+        takes: (subject, take) pairs, sorted.
+    """
+
+    def __init__(self, path: str | Path):
+        try:
+            self._file = h5py.File(path, "r")
+        except OSError as error:
+            raise InputError(
+                f"no readable database ({error})",
+                "an HDF5 that the rule `database` wrote",
+                "Remove the file and run again.",
+                path=path,
+            ) from error
+        found = (self._file.attrs.get("format"), int(self._file.attrs.get("format_version", -1)))
+        if found != (FORMAT, FORMAT_VERSION):
+            raise InputError(
+                f"format {found[0]!r}, version {found[1]}",
+                f"{FORMAT!r}, version {FORMAT_VERSION}",
+                "Rebuild it with this version of Vermilion.",
+                path=path,
+            )
+        file = self._file
+        self.triangles = file["topology/triangles"][:]
+        self.topology = str(file["topology/triangles"].attrs["sha256"])
+        self.mask = file["mask/triangles"][:]
+        self.area_mm2 = file["mask/area_mm2"][:]
+        self.feature_names = tuple(name.decode() for name in file["features/names"][:])
+        self.takes = tuple((s, t) for s in sorted(file["takes"]) for t in sorted(file["takes"][s]))
+
+    def __enter__(self) -> LipDatabase:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._file.close()
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        return tuple(sorted({subject for subject, _ in self.takes}))
+
+    def neutral_mm(self, subject: str) -> np.ndarray:
+        """(V, 3) coarse neutral of a subject in the head frame."""
+        return self._file[f"subjects/{subject}/neutral_mm"][:]
+
+    def read_take(self, subject: str, take: str) -> TakeEntry:
+        """All frames of a take."""
+        group = self._file[f"takes/{subject}/{take}"]
+        return TakeEntry(
+            subject=subject,
+            take=take,
+            fps=float(group.attrs["fps"]),
+            split=str(group.attrs["split"]),
+            frames=group["frames"][:],
+            features=group["features"][:],
+            layers=group["layers"][:],
+            valid=group["valid"][:],
+            train=group["train"][:],
+        )
+
+    def training_set(self, subjects: Collection[str]) -> TrainingSet:
+        """The valid training frames of some subjects.
+
+        Raises InputError where there are fewer than ten.
+        """
+        chosen = [(s, t) for s, t in self.takes if s in subjects]
+        rows = []
+        for subject, take in chosen:
+            group = self._file[f"takes/{subject}/{take}"]
+            rows.append(np.flatnonzero(group["valid"][:] & group["train"][:]))
+        total = sum(len(r) for r in rows)
+        if total < 10:
+            raise InputError(
+                f"{total} valid training frames of {', '.join(sorted(subjects)) or 'no subject'}",
+                "at least 10",
+                "Give a take of role `tattoo` with split `train` or `test:A-B`, and look at the "
+                "quality table for frames that failed.",
+            )
+        n_features, n_outputs = len(self.feature_names), len(self.mask) * 9
+        features = np.empty((total, n_features), dtype=np.float32)
+        layers = np.empty((total, n_outputs), dtype=np.float32)
+        frames = np.empty(total, dtype=np.int32)
+        sequences = np.repeat(np.arange(len(chosen)), [len(r) for r in rows])
+        first = 0
+        for (subject, take), part in zip(chosen, rows, strict=True):
+            group = self._file[f"takes/{subject}/{take}"]
+            to = slice(first, first + len(part))
+            if len(part):
+                features[to] = group["features"][part]
+                layers[to] = group["layers"][part].reshape(len(part), -1)
+                frames[to] = group["frames"][part]
+            first += len(part)
+        names = tuple(f"{s}/{t}" for s, t in chosen)
+        return TrainingSet(features, layers, sequences, names, frames)

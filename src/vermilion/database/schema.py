@@ -1,0 +1,79 @@
+"""What lies where in `lips.h5`; `docs/database.md` tells the same to a reader of the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FORMAT = "vermilion-lip-database"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class SubjectEntry:
+    """A person.
+
+    Attributes:
+        subject: name.
+        neutral_mm: (V, 3) coarse neutral in the head frame.
+        mask: (M,) ascending ids of the coarse triangles whose layers were made.
+    """
+
+    subject: str
+    neutral_mm: np.ndarray
+    mask: np.ndarray
+
+
+@dataclass(frozen=True)
+class TakeEntry:
+    """The frames of a take.
+
+    Attributes:
+        subject, take: names.
+        fps: frames a second.
+        split: the take sheet's text.
+        frames: (F,) int32 frame numbers, ascending.
+        features: (F, M) float32.
+        layers: (F, T, 9) float32 over the mask.
+        valid: (F,) bool, both features and layers are good.
+        train: (F,) bool, regressors may train on the frame.
+    """
+
+    subject: str
+    take: str
+    fps: float
+    split: str
+    frames: np.ndarray
+    features: np.ndarray
+    layers: np.ndarray
+    valid: np.ndarray
+    train: np.ndarray
+
+    def __post_init__(self) -> None:
+        n_frames = len(self.frames)
+        for name in ("features", "layers", "valid", "train"):
+            if len(getattr(self, name)) != n_frames:
+                raise ValueError(
+                    f"{self.subject}/{self.take}: {name} has {len(getattr(self, name))} frames, "
+                    f"expected {n_frames}"
+                )
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """Rows that a regressor trains on, takes one after the other, each in order of time.
+
+    Attributes:
+        features: (F, M) float32.
+        layers: (F, T * 9) float32.
+        sequences: (F,) int index into `takes`.
+        takes: names `subject/take`.
+        frames: (F,) int32 frame numbers.
+    """
+
+    features: np.ndarray
+    layers: np.ndarray
+    sequences: np.ndarray
+    takes: tuple[str, ...]
+    frames: np.ndarray

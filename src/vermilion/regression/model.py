@@ -1,0 +1,193 @@
+"""A trained regressor with all that is needed to use it, and its file (HDF5, no pickle)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import numpy as np
+from sklearn.base import BaseEstimator
+
+import vermilion
+from vermilion.correspondence.correspondence import topology_hash
+from vermilion.errors import ModelFileError
+from vermilion.files import atomic_path
+from vermilion.regression.estimators import AffineRegressor, RBFNetwork
+
+FORMAT = "vermilion-regressor"
+FORMAT_VERSION = 1
+ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor}
+_ARRAYS = {
+    "rbf": ("prototypes_", "weights_", "bias_", "feature_mean_", "feature_scale_"),
+    "affine": ("weights_", "bias_", "feature_mean_", "feature_scale_"),
+}
+_SETTINGS = {
+    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum"),
+    "affine": ("alpha",),
+}
+
+
+@dataclass(frozen=True)
+class LipModel:
+    """A regressor from the features of a frame to the layers of the mask's triangles.
+
+    Attributes:
+        name: regressor and variant (`PS-anna`, `MS-affine`, ...).
+        estimator: fitted; features (F, M') -> layers (F, T * 9).
+        feature_names: names of all M features of a frame.
+        feature_columns: (M',) int, those that the estimator reads.
+        mask: (T,) int32 triangle ids of the coarse mesh.
+        topology: hash of the coarse topology.
+        training_frames: `subject/take` -> (n,) frame numbers trained on.
+        units: what the features and layers are measured in.
+    """
+
+    name: str
+    estimator: BaseEstimator
+    feature_names: tuple[str, ...]
+    feature_columns: np.ndarray
+    mask: np.ndarray
+    topology: str
+    training_frames: dict[str, np.ndarray]
+    units: dict[str, str] = field(
+        default_factory=lambda: {"layers": "rad, 1", "features": "see feature_names"}
+    )
+
+    @property
+    def training_subjects(self) -> tuple[str, ...]:
+        return tuple(sorted({name.split("/")[0] for name in self.training_frames}))
+
+    def predict(self, features: np.ndarray) -> np.ndarray:
+        """Layers (F, T, 9) of features (F, M)."""
+        return self.estimator.predict(self._chosen(features)).reshape(len(features), -1, 9)
+
+    def predict_frames_last(self, features: np.ndarray) -> np.ndarray:
+        """Layers (T, 9, F): the order that the integration reads fastest."""
+        flat = self.estimator.predict_frames_last(self._chosen(features))
+        return flat.reshape(len(self.mask), 9, len(features))
+
+    def novelty(self, features: np.ndarray) -> np.ndarray:
+        """How far features lie from what was trained on, (F,).
+
+        The distance to the nearest prototype (to the mean, for an affine regressor) in units where
+        two training frames are 1.4 apart in the root mean square.
+        """
+        scaled = self.estimator.scaled(self._chosen(features))
+        known = getattr(self.estimator, "prototypes_", np.zeros((1, scaled.shape[1])))
+        return np.sqrt(((scaled[:, None] - known[None]) ** 2).sum(axis=2).min(axis=1))
+
+    def check_topology(self, triangles: np.ndarray, path: str | Path | None = None) -> None:
+        """Raise ModelFileError where a mesh's triangles (T, 3) are not those of the training."""
+        found = topology_hash(triangles)
+        if found != self.topology:
+            raise ModelFileError(
+                f"a mesh of {len(triangles)} triangles with topology {found[:12]}",
+                f"the topology {self.topology[:12]} that {self.name} was trained on",
+                "Track the take with the face model of the training, or train on this one.",
+                path=path,
+            )
+
+    def _chosen(self, features: np.ndarray) -> np.ndarray:
+        features = np.asarray(features)
+        if features.ndim != 2 or features.shape[1] != len(self.feature_names):
+            raise ValueError(
+                f"features must be (F, {len(self.feature_names)}), got {features.shape}"
+            )
+        return features[:, self.feature_columns]
+
+
+def save_model(path: str | Path, model: LipModel) -> None:
+    """Write a model file, whole or not at all."""
+    kind = next(k for k, cls in ESTIMATORS.items() if isinstance(model.estimator, cls))
+    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs.update(
+            format=FORMAT,
+            format_version=FORMAT_VERSION,
+            vermilion_version=vermilion.__version__,
+            name=model.name,
+            estimator=kind,
+            topology_sha256=model.topology,
+            **{f"unit_{name}": unit for name, unit in sorted(model.units.items())},
+        )
+        for setting in _SETTINGS[kind]:
+            file.attrs[setting] = getattr(model.estimator, setting)
+        for name in _ARRAYS[kind]:
+            _put(file, f"estimator/{name.rstrip('_')}", getattr(model.estimator, name))
+        if model.estimator.feature_groups is not None:
+            _put(file, "estimator/feature_groups", np.array(model.estimator.feature_groups, "S"))
+        _put(file, "features/names", np.array(model.feature_names, dtype="S"))
+        _put(file, "features/columns", np.asarray(model.feature_columns, dtype=np.int32))
+        _put(file, "mask/triangles", np.asarray(model.mask, dtype=np.int32))
+        for name, frames in sorted(model.training_frames.items()):
+            _put(file, f"training/{name}", np.asarray(frames, dtype=np.int32))
+
+
+def load_model(path: str | Path) -> LipModel:
+    """Read a model file.
+
+    Raises ModelFileError, each with its own message, where the file is damaged, is no model, or
+    comes from a newer version.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            _check_header(file, path)
+            return _read(file)
+    except (OSError, KeyError, ValueError, RuntimeError) as error:
+        raise ModelFileError(
+            f"a truncated or damaged model file ({error})",
+            "a whole file as the rule `train` wrote it",
+            "Copy it again, or remove it and run again.",
+            path=path,
+        ) from error
+
+
+def _check_header(file: h5py.File, path: str | Path) -> None:
+    if file.attrs.get("format") != FORMAT:
+        raise ModelFileError(
+            f"an HDF5 of format {file.attrs.get('format')!r}",
+            f"a regressor of Vermilion ({FORMAT!r})",
+            "Give a file of the folder `models/`.",
+            path=path,
+        )
+    version = int(file.attrs["format_version"])
+    if version > FORMAT_VERSION:
+        raise ModelFileError(
+            f"format version {version}, written by Vermilion {file.attrs['vermilion_version']}",
+            f"at most version {FORMAT_VERSION}",
+            "Update Vermilion, or train the regressor with this version.",
+            path=path,
+        )
+
+
+def _read(file: h5py.File) -> LipModel:
+    kind = str(file.attrs["estimator"])
+    settings = {name: file.attrs[name].item() for name in _SETTINGS[kind]}
+    if "estimator/feature_groups" in file:
+        settings["feature_groups"] = _strings(file["estimator/feature_groups"])
+    estimator = ESTIMATORS[kind](**settings)
+    for name in _ARRAYS[kind]:
+        setattr(estimator, name, file[f"estimator/{name.rstrip('_')}"][:])
+    estimator.n_features_in_ = len(estimator.feature_mean_)
+    training: dict[str, np.ndarray] = {}
+    for subject, takes in file["training"].items():
+        training.update({f"{subject}/{take}": frames[:] for take, frames in takes.items()})
+    units = {k.removeprefix("unit_"): str(v) for k, v in file.attrs.items() if k[:5] == "unit_"}
+    return LipModel(
+        name=str(file.attrs["name"]),
+        estimator=estimator,
+        feature_names=tuple(_strings(file["features/names"])),
+        feature_columns=file["features/columns"][:],
+        mask=file["mask/triangles"][:],
+        topology=str(file.attrs["topology_sha256"]),
+        training_frames=training,
+        units=units,
+    )
+
+
+def _strings(dataset: h5py.Dataset) -> list[str]:
+    return [value.decode() for value in dataset[:]]
+
+
+def _put(file: h5py.File, name: str, data: np.ndarray) -> None:
+    file.create_dataset(name, data=data, track_times=False)
