@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from evaluation_face import mouth_triangles, sheet_face
 
+from tests.unit.evaluation_face import mouth_triangles, sheet_face
 from vermilion.evaluation.errors import ClipSums, second_differences
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from evaluation_face import sheet_face
 
+from tests.unit.evaluation_face import sheet_face
 from vermilion.evaluation.closest import Surface, SurfacePoints
 from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, drift, reference_of, truth_of_vertices

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from evaluation_face import sheet_face
 
+from tests.unit.evaluation_face import sheet_face
 from vermilion.camera import pinhole
 from vermilion.export.objs import write_obj
-from vermilion.export.overlay import crop_round, join_videos, overlay_picture, strip_round
+from vermilion.export.overlay import crop_round, join_videos, overlay_picture, strips_following
 from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
 from vermilion.export.weights import write_weights
 from vermilion.sequences import read_mesh
@@ -106,7 +106,7 @@ def test_crop_shows_the_mesh_where_the_whole_picture_has_it():
     points = camera.project(vertices[0])
     for crop in (
         crop_round(points, (640, 480), 0.3, 200),
-        strip_round(points, (640, 480), 0.3, (200, 120)),
+        strips_following(points[None], 0.3, (200, 120))[0],
     ):
         near = crop.of_camera(camera)
         assert (near.width_px, near.height_px) == crop.size
@@ -130,3 +130,12 @@ def test_overlay_has_a_column_a_mesh_and_says_what_is_not_tracked():
     assert (middle[0] == 120).all()
     assert (middle[1] != 120).all()
     assert (middle[2] == 60).all()
+
+
+def test_strips_follow_the_lips_and_pass_over_a_lost_frame():
+    points = np.array([[0.0, 0.0], [40.0, 20.0]]) + 3.0 * np.arange(30)[:, None, None]
+    points[12] = np.nan
+    strips = strips_following(points, 0.0, (80, 40))
+    assert {strip.size for strip in strips} == {(80, 40)}
+    lefts = np.array([strip.left for strip in strips])
+    assert np.abs(np.diff(lefts[8:22]) - 3).max() <= 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,11 +10,12 @@ from pathlib import Path
 import av
 import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from vermilion.camera import Camera
 from vermilion.draw import label
 from vermilion.files import atomic_path
-from vermilion.mesh import vertex_normals
+from vermilion.mesh import adjacency, vertex_normals
 from vermilion.raycast import RayCaster, interpolate
 
 SKIN = (0.80, 0.79, 0.77)
@@ -83,19 +85,33 @@ def crop_round(
     return Crop(int(low[0]), int(low[1]), width, height, height_px / height)
 
 
-def strip_round(
-    points_px: np.ndarray, picture_px: tuple[int, int], margin: float, size_px: tuple[int, int]
-) -> Crop:
-    """The crop round the points that fills a panel of `size_px` (width, height) when shown."""
-    low, high = _extent(points_px, picture_px)
-    centre, extent = (low + high) / 2, (1 + margin) * (high - low)
+def strips_following(
+    points_px: np.ndarray, margin: float, size_px: tuple[int, int], smooth_frames: float = 4.0
+) -> list[Crop]:
+    """Crops of one scale that follow the points (F, N, 2) smoothly and fill `size_px` when shown.
+
+    `size_px` is (width, height). Frames without finite points take the centre of their neighbours.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # frames without a finite point
+        low, high = np.nanmin(points_px, axis=1), np.nanmax(points_px, axis=1)
+    known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
+    if not known.any():
+        return [Crop(0, 0, *size_px, 1.0)] * len(points_px)
+    extent = (1 + margin) * np.median((high - low)[known], axis=0)
     scale = float(min(size_px[0] / extent[0], size_px[1] / extent[1]))
+    frames = np.arange(len(points_px))
+    centre = np.stack(
+        [np.interp(frames, frames[known], (low + high)[known, axis] / 2) for axis in (0, 1)], axis=1
+    )
+    centre = gaussian_filter1d(centre, smooth_frames, axis=0, mode="nearest")
     width, height = round(size_px[0] / scale), round(size_px[1] / scale)
-    left, top = np.rint(centre - [width / 2, height / 2]).astype(int)
-    return Crop(int(left), int(top), width, height, scale)
+    corners = np.rint(centre - [width / 2, height / 2]).astype(int)
+    return [Crop(int(left), int(top), width, height, scale) for left, top in corners]
 
 
-def _extent(points_px, picture_px):
+def _extent(points_px: np.ndarray, picture_px: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Corner with the least and with the greatest coordinates; the picture's without points."""
     points = points_px.reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) == 0:
@@ -103,11 +119,15 @@ def _extent(points_px, picture_px):
     return np.quantile(points, 0.005, axis=0), np.quantile(points, 0.995, axis=0)
 
 
-def lip_colours(n_vertices: int, vermilion: np.ndarray) -> np.ndarray:
-    """(V, 3) colours in [0, 1]: light skin, lips slightly red; `vermilion` (V,) bool."""
-    colours = np.tile(SKIN, (n_vertices, 1))
-    colours[vermilion] = LIPS
-    return colours
+def lip_colours(triangles: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
+    """(V, 3) colours in [0, 1]: light skin, lips slightly red; `vermilion` (V,) bool.
+
+    The border is softened over one ring of vertices.
+    """
+    neighbours = adjacency(triangles, len(vermilion))
+    share = vermilion.astype(float)
+    share = 0.5 * share + 0.5 * (neighbours @ share) / np.maximum(neighbours.sum(axis=1), 1)
+    return np.array(SKIN) + share[:, None] * (np.array(LIPS) - SKIN)
 
 
 def shade(
