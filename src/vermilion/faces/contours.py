@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
+from scipy.interpolate import CubicSpline
 from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
 
 from vermilion.mesh import unique_edges
 
@@ -44,6 +46,35 @@ def closed_loop(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
             path.append(step)
         loop += path[:0:-1]
     return np.array(loop, dtype=np.int32)
+
+
+def smooth_loop(
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    waypoints: np.ndarray,
+    left_corner: int,
+    tolerance_mm: float = 0.4,
+) -> np.ndarray:
+    """Closed vertex loop (n,) through the waypoints that keeps to splines through them.
+
+    There are two splines, as a mouth has corners: from the first waypoint over the upper lip to
+    waypoint number `left_corner`, and back under the lower. Shortest paths alone would cut across
+    rows of the mesh where the loop bends; here an edge costs the more, the further it lies from
+    the splines.
+    """
+    closed = np.append(waypoints, waypoints[0])
+    halves = (closed[: left_corner + 1], closed[left_corner:])
+    curve = np.concatenate([_spline(vertices_mm[half]) for half in halves])
+    distance, _ = cKDTree(curve).query(vertices_mm)
+    graph = edge_graph(vertices_mm, triangles, cost=1.0 + (distance / tolerance_mm) ** 2)
+    return closed_loop(graph, waypoints)
+
+
+def _spline(knots: np.ndarray) -> np.ndarray:
+    """Dense points of the natural cubic spline through the knots, (60 n, 3)."""
+    chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
+    places = np.linspace(0, chord[-1], 60 * len(knots))
+    return CubicSpline(chord, knots, bc_type="natural")(places)
 
 
 def geodesic_distance(graph: sparse.spmatrix, sources: np.ndarray) -> np.ndarray:

@@ -5,8 +5,9 @@ ear, has x < 0), y up, z out of the face; only centimetres become millimetres. V
 (face, head and neck, sockets, gums and tongue, teeth, eyeballs) keep their numbers; lacrimal fluid,
 eye occlusion and lashes are left out.
 
-ICT has no lip material. The vermilion is bounded by its outer lip landmarks, joined by shortest
-paths along the edges, and by where the lips meet (its inner lip landmarks, joined likewise).
+ICT has no lip material. The vermilion is bounded by its outer lip landmarks, joined along the
+edges that keep to splines through them, and by where the lips meet (its inner lip landmarks,
+joined likewise).
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from scipy.spatial import cKDTree
 from vermilion.faces.contours import (
     LEFT_CORNER,
     RIGHT_CORNER,
-    closed_loop,
     edge_graph,
     enclosed,
     geodesic_distance,
     lip_sides,
+    smooth_loop,
 )
 from vermilion.faces.decimation import decimate_model
 from vermilion.faces.ict_archive import IctData
@@ -88,9 +89,8 @@ def studio_model(data: IctData, n_identities: int = 100) -> FaceModel:
     triangles = _triangulated(data.polygons[kept])
     vertices = data.neutral_mm[:N_STUDIO]
     skin = triangles[(triangles < GUMS.start).all(axis=1)]
-    graph = edge_graph(vertices, skin)
-    outer = closed_loop(graph, data.landmarks68[list(OUTER_68)])
-    inner = closed_loop(graph, data.landmarks68[list(INNER_68)])
+    outer = smooth_loop(vertices, skin, data.landmarks68[list(OUTER_68)], left_corner=6)
+    inner = smooth_loop(vertices, skin, data.landmarks68[list(INNER_68)], left_corner=4)
     landmarks = data.landmarks68[list(SIXTY_SIX)]
     return FaceModel(
         name="ict",

@@ -27,8 +27,8 @@ MOUTH_POSES: tuple[dict[str, float], ...] = (
     {"mouthRollLower": 0.75, "mouthRollUpper": 0.75, "jawOpen": 0.06},
     {"mouthUpperUp_L": 0.70, "mouthUpperUp_R": 0.70, "jawOpen": 0.12},
     {"mouthLowerDown_L": 0.75, "mouthLowerDown_R": 0.75, "jawOpen": 0.08},
-    {"mouthLowerOut": 0.8, "mouthUpperOut": 0.8, "jawOpen": 0.1},
-    {"mouthRollLowerOut": 0.8, "mouthRollUpperOut": 0.8, "jawOpen": 0.1},
+    {"mouthRollOutLower": 0.8, "jawOpen": 0.1},
+    {"mouthRollOutLower": 0.7, "mouthRollOutUpper": 0.7, "jawOpen": 0.1},
     {"mouthPucker": 0.45, "mouthFunnel": 0.45, "jawOpen": 0.35},
     {"jawLeft": 0.45, "jawOpen": 0.25},
     {"jawRight": 0.45, "jawOpen": 0.25},
@@ -36,10 +36,20 @@ MOUTH_POSES: tuple[dict[str, float], ...] = (
     {"mouthSmile_L": 0.8, "mouthUpperUp_L": 0.3},
     {"mouthSmile_R": 0.8, "mouthUpperUp_R": 0.3},
 )
-UPPER_FACE: tuple[str, ...] = (
-    "browInnerUp_L browInnerUp_R browDown_L browDown_R browOuterUp_L browOuterUp_R "
-    "cheekSquint_L cheekSquint_R noseSneer_L noseSneer_R eyeSquint_L eyeSquint_R"
-).split()  # fmt: skip
+UPPER_FACE = (
+    "browInnerUp_L",
+    "browInnerUp_R",
+    "browDown_L",
+    "browDown_R",
+    "browOuterUp_L",
+    "browOuterUp_R",
+    "cheekSquint_L",
+    "cheekSquint_R",
+    "noseSneer_L",
+    "noseSneer_R",
+    "eyeSquint_L",
+    "eyeSquint_R",
+)
 OPENING = "jawOpen"
 #: Seconds that a generated pose takes to come, shortest and longest.
 POSE_SECONDS = (0.22, 0.42)

@@ -18,12 +18,13 @@ from vermilion.faces.contours import (
     lip_sides,
 )
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import adjacency, unique_edges
+from vermilion.mesh import unique_edges
+from vermilion.sparse import CholeskyFactor, cotangent_laplacian
 
 SKIN, MOUTH, TEETH, EYE = range(4)
 
-#: Smoothing steps of the vermilion border's distance, against stairs along the mesh's edges.
-BORDER_SMOOTHING = 3
+#: Reach of the smoothing of the vermilion border, against stairs along the mesh's edges (mm).
+BORDER_SMOOTHING_MM = 1.2
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,14 @@ def _lip_distance(model: FaceModel, skin: np.ndarray, graph: sparse.spmatrix) ->
     red = enclosed(skin, model.n_vertices, model.outer_contour, int(seed))
     signed = np.where(red, distance, -distance)
     signed[model.outer_contour] = 0.0
-    neighbours = adjacency(skin, model.n_vertices)
-    degree = np.maximum(np.asarray(neighbours.sum(axis=1)).ravel(), 1)
-    near = np.abs(signed) < 5.0
-    for _ in range(BORDER_SMOOTHING):
-        signed = np.where(near, 0.5 * signed + 0.5 * (neighbours @ signed) / degree, signed)
-    return signed
+    near = np.abs(signed) < 6.0
+    laplacian, mass = cotangent_laplacian(model.neutral_mm, skin)
+    used = np.unique(skin)
+    system = mass + BORDER_SMOOTHING_MM**2 * laplacian
+    factor = CholeskyFactor(system[used][:, used])
+    smooth = signed.copy()
+    smooth[used] = factor.solve((mass @ signed)[used])
+    return np.where(near, smooth, signed)
 
 
 def _inside_distance(model: FaceModel, skin: np.ndarray, graph: sparse.spmatrix) -> np.ndarray:

@@ -1,0 +1,179 @@
+"""A synthetic take: who acts, what they do, how they look and are lit, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from vermilion.camera import Camera
+from vermilion.faces.model import FaceModel
+from vermilion.studio import rig
+from vermilion.studio.lighting import LIGHTINGS, Lighting
+from vermilion.studio.live_link import read_live_link
+from vermilion.studio.look import Look, look_of
+from vermilion.studio.performance import (
+    Performance,
+    generated_weights,
+    head_motion,
+    random_poses,
+    start_at_neutral,
+)
+from vermilion.studio.render import Stage
+from vermilion.studio.surface import Surface
+
+#: Shapes, not expressions: eyeballs turn little, so that a gaze never leaves the lids.
+FREE_TURN_DEG = (24.0, 11.0, 7.0)
+
+
+@dataclass(frozen=True)
+class StudioTakePlan:
+    """Everything that decides the pictures of a take except its cameras and its noise.
+
+    Attributes:
+        identities: (F, I) coefficients of each frame's person.
+        performance: curves and head motion, a row a frame.
+        looks: seed of each frame's look, (F,).
+        lighting: name of each frame's light, (F,).
+        tattoo: whether the lips are painted.
+    """
+
+    model: FaceModel
+    identities: np.ndarray
+    performance: Performance
+    looks: np.ndarray
+    lighting: tuple[str, ...]
+    tattoo: bool
+
+    def __len__(self) -> int:
+        return len(self.performance)
+
+    def vertices_mm(self, index: int) -> np.ndarray:
+        """World vertices (V, 3) of the index-th frame of the take."""
+        performance = self.performance
+        local = self.model.vertices(self.identities[index], performance.weights[index])
+        return local @ performance.rotations[index].T + performance.translations_mm[index]
+
+    def neutral_mm(self) -> np.ndarray:
+        """Neutral (V, 3) of the first frame's person, expression weights 0, head at rest."""
+        return self.model.neutral_of(self.identities[0])
+
+    def look(self, index: int) -> Look:
+        return look_of(int(self.looks[index]), self.tattoo)
+
+    def light(self, index: int) -> Lighting:
+        return LIGHTINGS[self.lighting[index]]
+
+    def stage(self, index: int, surface: Surface, **rays: int) -> Stage:
+        """What the renderer needs of the index-th frame."""
+        return Stage(self.model.triangles, surface, self.look(index), self.light(index), **rays)
+
+
+def identity_of(
+    model: FaceModel, coefficients: list[float] | None, seed: int, spread: float
+) -> np.ndarray:
+    """Identity coefficients (I,): those given (the rest 0), or drawn from the seed."""
+    if coefficients is None:
+        drawn = np.random.default_rng([seed, 7000]).standard_normal(model.n_identities)
+        return spread * np.clip(drawn, -2.0, 2.0)
+    identity = np.zeros(model.n_identities)
+    given = np.asarray(coefficients, dtype=float)[: model.n_identities]
+    identity[: len(given)] = given
+    return identity
+
+
+def plan_take(
+    model: FaceModel,
+    *,
+    role: str,
+    n_frames: int,
+    fps: float,
+    subject_seed: int,
+    take_seed: int,
+    identity: np.ndarray,
+    performance: str = "generated",
+    csv: str | None = None,
+    csv_first: int = 0,
+    csv_fps: float = 30.0,
+    lights: str = "rig",
+    slight_open: float = 0.08,
+    ease_in_frames: int = 6,
+    intensity: float = 1.0,
+    head_turn_deg: float = 2.5,
+    head_shift_mm: float = 2.0,
+) -> StudioTakePlan:
+    """Plan a take of one actor; the first frame is the neutral, mouth slightly open.
+
+    `role` is that of the take sheet: only `tattoo` paints the lips.
+    """
+    names = model.expression_names
+    seed = int(np.random.default_rng([subject_seed, take_seed]).integers(2**31))
+    if performance == "live_link":
+        weights = read_live_link(csv, names, n_frames, fps, csv_first, csv_fps)
+    else:
+        weights = generated_weights(names, n_frames, fps, seed, intensity)
+    weights = start_at_neutral(names, weights, slight_open, ease_in_frames)
+    neck = model.neutral_mm[model.landmarks[8]] + [0.0, -40.0, -70.0]
+    motion = head_motion(n_frames, fps, seed, head_turn_deg, head_shift_mm, neck)
+    return StudioTakePlan(
+        model=model,
+        identities=np.broadcast_to(identity, (n_frames, len(identity))),
+        performance=Performance(names, weights, *motion),
+        looks=np.full(n_frames, subject_seed),
+        lighting=(lights,) * n_frames,
+        tattoo=role == "tattoo",
+    )
+
+
+def plan_people(model: FaceModel, n_frames: int, seed: int, spread: float) -> StudioTakePlan:
+    """Every frame another random person, expression, pose and light."""
+    rng = np.random.default_rng([seed, 7005])
+    identities = spread * np.clip(rng.standard_normal((n_frames, model.n_identities)), -2, 2)
+    angles = rng.uniform(-1, 1, (n_frames, 3)) * FREE_TURN_DEG
+    rotations = Rotation.from_euler("yxz", angles, degrees=True).as_matrix()
+    centre = model.neutral_mm[model.landmarks[27]] - [0.0, 0.0, 60.0]
+    shift = rng.uniform(-1, 1, (n_frames, 3)) * [14.0, 12.0, 90.0]
+    translations = centre - rotations @ centre + shift
+    weights = random_poses(model.expression_names, n_frames, seed)
+    kinds = sorted(LIGHTINGS)
+    return StudioTakePlan(
+        model=model,
+        identities=identities,
+        performance=Performance(model.expression_names, weights, rotations, translations),
+        looks=rng.integers(2**31, size=n_frames),
+        lighting=tuple(kinds[i] for i in rng.integers(len(kinds), size=n_frames)),
+        tattoo=False,
+    )
+
+
+def untattooed(plan: StudioTakePlan) -> StudioTakePlan:
+    """The same take without paint on the lips."""
+    return replace(plan, tattoo=False)
+
+
+def cameras_of(
+    plan: StudioTakePlan,
+    role: str,
+    *,
+    distance_mm: float,
+    face_size_px: tuple[int, int],
+    lip_size_px: tuple[int, int],
+    video_size_px: tuple[int, int],
+    face_view_mm: float,
+    lip_view_mm: float,
+    video_view_mm: float,
+) -> dict[str, Camera]:
+    """The rig of a multi-view take, or the camera of a video, aimed at the actor's neutral."""
+    neutral = plan.neutral_mm()
+    if role in ("tattoo", "plain"):
+        return rig.lips16_rig(
+            plan.model,
+            neutral,
+            distance_mm,
+            face_size_px,
+            lip_size_px,
+            face_view_mm,
+            lip_view_mm,
+        )
+    return rig.video_camera(plan.model, neutral, distance_mm, video_size_px, video_view_mm)
