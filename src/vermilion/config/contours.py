@@ -1,0 +1,114 @@
+"""Configuration of the lip contours (Lips16 3.2.2)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class BoostingConfig(StageConfig):
+    """Boosted trees of the contour detectors."""
+
+    trees: int = Field(160, ge=1, le=5000, description="Rounds of boosting (trees).")
+    depth: int = Field(4, ge=1, le=8, description="Splits from root to leaf of a tree.")
+    learning_rate: float = Field(0.15, gt=0, le=1, description="Shrinkage of each tree (share).")
+    features_per_tree: int = Field(
+        128, ge=1, description="Random subset of the pool that one tree may use (features)."
+    )
+    sample_share: float = Field(
+        0.4, gt=0, le=1, description="Share of the samples that choose a tree's splits."
+    )
+    l2: float = Field(
+        5.0, gt=0, description="Ridge on leaf values (second derivative of the loss)."
+    )
+
+
+class ContourDetectorConfig(StageConfig):
+    """How contours are found: by detectors trained on labelled frames, or from landmarks."""
+
+    kind: Literal["auto", "boosted", "landmarks"] = Field(
+        "auto",
+        description="`boosted`: edge learning, trained on the take's labelled frames. `landmarks`: "
+        "ridges along the landmarks' lips, sharpened by edges. `auto`: boosted where the take has "
+        "labelled frames in the monocular camera, else landmarks.",
+    )
+    interocular_size_px: float = Field(
+        200.0,
+        ge=60,
+        le=600,
+        description="Inter-ocular distance to which the mouth's region is scaled before detection "
+        "(pixels): the working resolution.",
+    )
+    margin: float = Field(
+        0.16,
+        gt=0,
+        le=0.5,
+        description="Width of the band round the landmarks' mouth that is looked at (per "
+        "inter-ocular distance).",
+    )
+    features: int = Field(2000, ge=50, le=50_000, description="Size of the pool (features).")
+    patch_px: int = Field(
+        48, ge=8, le=78, description="Side of the patch a feature may reach (region pixels)."
+    )
+    label_px: float = Field(
+        1.2, gt=0, le=5, description="Deviation of the soft labels about a contour (region pixels)."
+    )
+    variants: int = Field(
+        4,
+        ge=1,
+        le=32,
+        description="Samples of a labelled frame: itself, then jittered or mirrored.",
+    )
+    far_share: float = Field(
+        0.08, gt=0, le=1, description="Share of the pixels far from a contour that are drawn."
+    )
+    max_samples: int = Field(
+        30_000, ge=1000, description="Pixels at most that a detector is trained on at first."
+    )
+    hard_rounds: int = Field(
+        1, ge=0, le=5, description="Rounds in which pixels wrongly taken for contour are added."
+    )
+    smoothing_px: float = Field(
+        1.0, gt=0, le=5, description="Deviation of the Gaussian on the maps (region pixels)."
+    )
+    ridge_width: float = Field(
+        0.022,
+        gt=0,
+        le=0.2,
+        description="`landmarks`: deviation of the ridges (per inter-ocular distance).",
+    )
+    sharpening: float = Field(
+        0.7, ge=0, le=1, description="`landmarks`: share of a ridge that needs an image edge."
+    )
+    boosting: BoostingConfig = Field(
+        default_factory=BoostingConfig, description="Boosted trees of the detectors."
+    )
+    seed: int = Field(0, ge=0, description="Seed of the random features and samples.")
+
+
+class ContourMapsConfig(StageConfig):
+    """Likelihood maps of every frame."""
+
+    least_peak: float = Field(
+        0.2,
+        ge=0,
+        le=1,
+        description="A frame whose outer map stays below this likelihood is flagged.",
+    )
+    overlay_frames: int = Field(
+        12, ge=1, le=200, description="Frames at most in a chunk's overlay picture."
+    )
+
+
+class ContoursConfig(StageConfig):
+    """Lip contour likelihood maps."""
+
+    detector: ContourDetectorConfig = Field(
+        default_factory=ContourDetectorConfig, description="How contours are found."
+    )
+    maps: ContourMapsConfig = Field(
+        default_factory=ContourMapsConfig, description="Maps of every frame."
+    )

@@ -1,0 +1,1 @@
+"""Inner and outer lip contours as likelihood maps (Lips16 3.2.2)."""

@@ -1,0 +1,119 @@
+"""Likelihood maps of the frames of a take: files, quality and overlay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.contours.detector import ContourDetector
+from vermilion.contours.labels import ContourLabel
+from vermilion.contours.region import mouth_region, usable
+from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.errors import InputError
+from vermilion.frames import FrameSource
+from vermilion.images import read_channels, write_channels
+from vermilion.landmarks.scheme import interocular_px
+from vermilion.quality import QualityRow
+
+INNER_COLOUR, OUTER_COLOUR = (255, 70, 60), (70, 255, 90)
+LABEL_COLOUR = (255, 230, 60)
+
+
+def write_maps(path: str | Path, inner: np.ndarray, outer: np.ndarray) -> None:
+    """Write the maps (h, w) of a frame as half EXR with channels `inner`, `outer`."""
+    write_channels(path, {"inner": inner, "outer": outer})
+
+
+def read_maps(path: str | Path, **place) -> tuple[np.ndarray, np.ndarray]:
+    """(inner, outer) maps (h, w) float32 of a frame. Raises InputError where they are not so."""
+    channels = read_channels(path, **place)
+    if not {"inner", "outer"} <= channels.keys():
+        raise InputError(
+            f"channels {sorted(channels)}",
+            "`inner` and `outer`",
+            "Remove the file and run again.",
+            path=path,
+            **place,
+        )
+    return channels["inner"], channels["outer"]
+
+
+def frame_maps(
+    source: FrameSource,
+    camera: str,
+    frame: int,
+    landmarks_px: np.ndarray,
+    landmarks_valid: bool,
+    detector: ContourDetector,
+    least_peak: float,
+) -> tuple[tuple[np.ndarray, np.ndarray] | None, np.ndarray | None, QualityRow]:
+    """Maps of one frame: ((inner, outer) or None, the picture or None, what is to be said of it).
+
+    A frame that cannot be read, or has no face, has no maps and an invalid row.
+    """
+    try:
+        picture = source.read(camera, frame)
+    except InputError as error:
+        return None, None, QualityRow(frame, False, f"unreadable: {error}")
+    reason = usable(landmarks_px, picture.shape) if landmarks_valid else "no landmarks"
+    if reason:
+        return None, picture, QualityRow(frame, False, reason)
+    inner, outer = detector.likelihood(picture, landmarks_px)
+    figures = {
+        "inner_peak": peak(inner),
+        "outer_peak": peak(outer),
+        "interocular_px": float(interocular_px(landmarks_px)),
+    }
+    if figures["outer_peak"] < least_peak:
+        row = QualityRow(frame, False, "no outer contour found", figures)
+    else:
+        row = QualityRow(frame, figures=figures)
+    return (inner, outer), picture, row
+
+
+def peak(likelihood: np.ndarray) -> float:
+    """Likelihood that the strongest 200 pixels of a map exceed, as a single speck does not count."""
+    values = np.partition(likelihood.ravel(), -200)
+    return float(values[-200])
+
+
+def maps_overlay(
+    picture: np.ndarray,
+    maps: tuple[np.ndarray, np.ndarray],
+    landmarks_px: np.ndarray,
+    frame: int,
+    drawn: ContourLabel | None = None,
+    side_px: int = 320,
+) -> np.ndarray:
+    """The mouth's region beside itself with the maps over it, (side, 2 side, 3) uint8.
+
+    Inner contour red, outer green; contours that a person drew are yellow.
+    """
+    region = mouth_region(landmarks_px, side_px / 1.1, 0.16)
+    crop = to_display(region.crop(picture))
+    inner, outer = (np.clip(region.crop(plane), 0, 1)[..., None] for plane in maps)
+    mixed = crop * (1 - 0.8 * np.maximum(inner, outer))
+    mixed = mixed + 0.8 * (inner * INNER_COLOUR + outer * OUTER_COLOUR)
+    mixed = np.clip(mixed, 0, 255).astype(np.uint8)
+    crop = draw_points(crop, np.concatenate([region.outer_px, region.inner_px]), (90, 160, 255), 1)
+    if drawn is not None:
+        for line in (drawn.inner, drawn.outer):
+            mixed = draw_polyline(
+                mixed, region.to_region(line.points_px), LABEL_COLOUR, line.closed
+            )
+    return label(np.hstack([crop, mixed]), f"frame {frame}")
+
+
+def sheet(pictures: list[np.ndarray], columns: int = 3) -> np.ndarray:
+    """A contact sheet; a grey field where there are no pictures."""
+    if not pictures:
+        return np.full((64, 256, 3), 90, dtype=np.uint8)
+    return tile(pictures, columns)
+
+
+def evenly(frames: list[int], count: int) -> set[int]:
+    """At most `count` of the frames, evenly taken, the first and the last among them."""
+    if len(frames) <= count:
+        return set(frames)
+    return {frames[round(i)] for i in np.linspace(0, len(frames) - 1, count)}

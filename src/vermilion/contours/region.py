@@ -1,0 +1,138 @@
+"""The mouth's region of a picture, upright and at one scale whatever the face's size and roll."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vermilion.landmarks.scheme import EYE_CORNERS, LIP_INNER, LIP_OUTER, MOUTH, interocular_px
+
+#: Side of the square region, per inter-ocular distance.
+SIDE = 1.1
+
+
+@dataclass(frozen=True)
+class MouthRegion:
+    """A square of `size_px` pixels round the mouth, the eyes' line horizontal.
+
+    Attributes:
+        image_from_region: (2, 3) similarity, region pixels to image pixels (both with the centre
+            of the top-left pixel at (0.5, 0.5)).
+        size_px: side of the region in its own pixels.
+        outer_px, inner_px: (n, 2) the landmarks' lip loops in the region.
+        mask: (size, size) bool, pixels near enough to the mouth to be looked at.
+    """
+
+    image_from_region: np.ndarray
+    size_px: int
+    outer_px: np.ndarray
+    inner_px: np.ndarray
+    mask: np.ndarray
+
+    @property
+    def region_from_image(self) -> np.ndarray:
+        return cv2.invertAffineTransform(self.image_from_region)
+
+    @property
+    def scale(self) -> float:
+        """Image pixels per region pixel."""
+        return float(np.sqrt(np.abs(np.linalg.det(self.image_from_region[:, :2]))))
+
+    def to_region(self, points_px: np.ndarray) -> np.ndarray:
+        """Image pixels (N, 2) in the region."""
+        return apply_affine(self.region_from_image, points_px)
+
+    def to_image(self, points_px: np.ndarray) -> np.ndarray:
+        """Region pixels (N, 2) in the image."""
+        return apply_affine(self.image_from_region, points_px)
+
+    def crop(self, picture: np.ndarray) -> np.ndarray:
+        """The region of a picture (h, w, channels), (size, size, channels); edges repeat."""
+        source = np.ascontiguousarray(picture, dtype=np.float32)
+        if self.scale > 1.0:  # the picture has more detail than the region can hold
+            source = cv2.GaussianBlur(source, (0, 0), 0.5 * np.sqrt(self.scale**2 - 0.75))
+        return cv2.warpAffine(
+            source,
+            centred(self.image_from_region),
+            (self.size_px, self.size_px),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+
+    def paste(self, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+        """Values (size, size) of the region in a picture of `shape`, zero elsewhere."""
+        return cv2.warpAffine(
+            np.ascontiguousarray(values, dtype=np.float32),
+            centred(self.region_from_image),
+            (shape[1], shape[0]),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=0.0,
+        )
+
+
+def mouth_region(
+    landmarks_px: np.ndarray,
+    interocular_size_px: float,
+    margin: float,
+    jitter: np.ndarray | None = None,
+) -> MouthRegion:
+    """The region of a face with landmarks (66, 2).
+
+    Args:
+        landmarks_px: (66, 2) image pixels.
+        interocular_size_px: inter-ocular distance in the region, that is its resolution.
+        margin: width of the band round the landmarks' mouth that is looked at, per
+            inter-ocular distance.
+        jitter: (2, 2) matrix applied to the region about its centre, to vary training samples.
+    """
+    landmarks = np.asarray(landmarks_px, dtype=np.float64)
+    across = landmarks[EYE_CORNERS[1]] - landmarks[EYE_CORNERS[0]]
+    across /= interocular_size_px
+    linear = np.array([[across[0], -across[1]], [across[1], across[0]]])
+    if jitter is not None:
+        linear = linear @ jitter
+    mouth = landmarks[MOUTH]
+    upright = mouth @ np.linalg.inv(linear).T
+    centre = linear @ (0.5 * (upright.min(axis=0) + upright.max(axis=0)))
+    size = round(SIDE * interocular_size_px)
+    image_from_region = np.column_stack([linear, centre - linear @ np.full(2, size / 2)])
+    inverse = cv2.invertAffineTransform(image_from_region)
+    outer = apply_affine(inverse, landmarks[LIP_OUTER])
+    inner = apply_affine(inverse, landmarks[LIP_INNER])
+    mask = _near(outer, size, margin * interocular_size_px)
+    return MouthRegion(image_from_region, size, outer, inner, mask)
+
+
+def usable(landmarks_px: np.ndarray, shape: tuple[int, ...]) -> str:
+    """Why landmarks (66, 2) cannot place a mouth in a picture of `shape`; empty if they can."""
+    if not np.isfinite(landmarks_px).all():
+        return "no landmarks"
+    if interocular_px(landmarks_px) < 16:
+        return "the face is too small"
+    centre = landmarks_px[MOUTH].mean(axis=0)
+    if not ((centre >= 0) & (centre < [shape[1], shape[0]])).all():
+        return "the mouth is outside the picture"
+    return ""
+
+
+def apply_affine(affine: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (..., 2) through a (2, 3) affine map."""
+    return np.asarray(points, dtype=np.float64) @ affine[:, :2].T + affine[:, 2]
+
+
+def centred(affine: np.ndarray) -> np.ndarray:
+    """The same map for OpenCV, whose pixel centres are whole numbers."""
+    shifted = affine.copy()
+    shifted[:, 2] += affine[:, :2] @ [0.5, 0.5] - [0.5, 0.5]
+    return shifted
+
+
+def _near(outer_px: np.ndarray, size: int, margin_px: float) -> np.ndarray:
+    filled = np.zeros((size, size), dtype=np.uint8)
+    hull = cv2.convexHull(outer_px.astype(np.float32))
+    cv2.fillConvexPoly(filled, np.rint(hull).astype(np.int32), 1)
+    distance = cv2.distanceTransform(1 - filled, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return distance <= margin_px

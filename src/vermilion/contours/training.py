@@ -1,0 +1,294 @@
+"""Training of the boosted contour detectors from a few labelled frames (Lips16 3.2.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from vermilion.contours.boosting import (
+    BoostingSettings,
+    Forest,
+    bin_edges,
+    bin_features,
+    fit_forest,
+)
+from vermilion.contours.channels import CHANNELS, image_channels, integral_images
+from vermilion.contours.detector import BoostedDetector
+from vermilion.contours.labels import (
+    CONTOURS,
+    ContourLabel,
+    contact_lines,
+    distance_to,
+    label_paths,
+    read_label,
+)
+from vermilion.contours.pool import FeaturePool, random_pool
+from vermilion.contours.region import apply_affine, mouth_region
+from vermilion.errors import InputError
+from vermilion.frames import FrameSource
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.progress import progress
+
+
+@dataclass(frozen=True)
+class TrainingSettings:
+    """How samples are drawn and detectors trained. Lengths are in region pixels.
+
+    Attributes:
+        interocular_size_px: inter-ocular distance of the region: the working resolution.
+        margin: of the region round the mouth, per inter-ocular distance.
+        n_features: size of the pool.
+        patch_px: side of the patch that a feature may reach.
+        label_px: deviation of the soft labels about the contour.
+        variants: samples of each labelled frame: itself, then varied in scale, roll and side.
+        far_share: share of the pixels far from any contour that are drawn at first.
+        max_samples: pixels at most that a contour's detector is trained on at first.
+        hard_rounds: rounds in which false answers of the last detector are added.
+        smoothing_px: deviation of the Gaussian on the maps.
+        boosting: of the trees.
+    """
+
+    interocular_size_px: float = 200.0
+    margin: float = 0.16
+    n_features: int = 2000
+    patch_px: int = 48
+    label_px: float = 1.2
+    variants: int = 4
+    far_share: float = 0.08
+    max_samples: int = 30_000
+    hard_rounds: int = 1
+    smoothing_px: float = 1.0
+    boosting: BoostingSettings = field(default_factory=BoostingSettings)
+
+    @classmethod
+    def of(cls, section) -> TrainingSettings:
+        """From a section of the configuration with the same names."""
+        trees = section.boosting
+        return cls(
+            interocular_size_px=section.interocular_size_px,
+            margin=section.margin,
+            n_features=section.features,
+            patch_px=section.patch_px,
+            label_px=section.label_px,
+            variants=section.variants,
+            far_share=section.far_share,
+            max_samples=section.max_samples,
+            hard_rounds=section.hard_rounds,
+            smoothing_px=section.smoothing_px,
+            boosting=BoostingSettings(
+                n_trees=trees.trees,
+                depth=trees.depth,
+                learning_rate=trees.learning_rate,
+                features_per_tree=trees.features_per_tree,
+                sample_share=trees.sample_share,
+                l2=trees.l2,
+                seed=section.seed,
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class LabelledFrame:
+    """A picture (h, w, 3) linear RGB, its landmarks (66, 2) and the contours drawn on it."""
+
+    linear_rgb: np.ndarray
+    landmarks_px: np.ndarray
+    label: ContourLabel
+
+
+def read_labelled(
+    capture: str | Path,
+    camera: str,
+    source: FrameSource,
+    landmarks: LandmarkTrack,
+    required: bool,
+    **place,
+) -> list[LabelledFrame]:
+    """The labelled frames of a take's monocular camera whose landmarks were found.
+
+    Args:
+        capture: the capture folder, with `labels/contours/<camera>/`.
+        camera: whose labels count.
+        source: the pictures (inpainted, where the lips wear a tattoo).
+        landmarks: of the whole take.
+        required: raise InputError where there are none.
+        place: subject and take, for messages.
+    """
+    labelled = []
+    for frame, path in label_paths(capture, camera).items():
+        index = np.flatnonzero((landmarks.frames == frame) & landmarks.valid)
+        if len(index) == 0:
+            print(f"label of frame {frame} left out: not in the take, or no landmarks")
+            continue
+        drawn = read_label(path, camera=camera, frame=frame, **place)
+        points = landmarks.points_px[index[0]]
+        labelled.append(LabelledFrame(source.read(camera, frame), points, drawn))
+    if required and not labelled:
+        raise InputError(
+            "no usable contour labels",
+            f"some frames of camera {camera} in labels/contours/{camera}/",
+            "Label a few frames, or set contours.detector.kind to auto or landmarks.",
+            path=capture,
+            camera=camera,
+            **place,
+        )
+    return labelled
+
+
+@dataclass(frozen=True)
+class _Example:
+    """One cropped variant of a frame: integral images, and targets per contour."""
+
+    integrals: np.ndarray
+    distance: dict[str, np.ndarray]
+    usable: dict[str, np.ndarray]
+
+
+def train_detector(
+    frames: Sequence[LabelledFrame], settings: TrainingSettings, seed: int = 0
+) -> BoostedDetector:
+    """Train the inner and the outer detector, separately, on labelled frames of one illumination.
+
+    Raises ValueError without frames.
+    """
+    if not frames:
+        raise ValueError("contour detectors need at least one labelled frame")
+    random = np.random.default_rng(seed)
+    examples = [
+        example
+        for frame in progress(frames, "contour labels")
+        for example in _examples(frame, settings, random)
+    ]
+    pool = random_pool(settings.n_features, len(CHANNELS), settings.patch_px, random)
+    forests = {
+        name: _train_one(examples, name, pool, settings, random)
+        for name in progress(CONTOURS, "contour detectors")
+    }
+    return BoostedDetector(
+        forests, settings.interocular_size_px, settings.margin, settings.smoothing_px
+    )
+
+
+def _examples(
+    frame: LabelledFrame, settings: TrainingSettings, random: np.random.Generator
+) -> list[_Example]:
+    examples = []
+    for variant in range(settings.variants):
+        jitter = None if variant == 0 else _jitter(random, mirrored=variant % 2 == 1)
+        region = mouth_region(
+            frame.landmarks_px, settings.interocular_size_px, settings.margin, jitter
+        )
+        inverse = cv2.invertAffineTransform(region.image_from_region)
+        lines = {name: getattr(frame.label, name).dense() for name in CONTOURS}
+        distance = {
+            name: distance_to(apply_affine(inverse, line), region.size_px)
+            for name, line in lines.items()
+        }
+        usable = {name: region.mask.copy() for name in CONTOURS}
+        contact = np.zeros(region.mask.shape, dtype=np.uint8)
+        for segment in contact_lines(frame.label):
+            start, end = np.rint(apply_affine(inverse, segment)).astype(int).tolist()
+            cv2.line(contact, start, end, 1, thickness=round(0.06 * settings.interocular_size_px))
+        usable["inner"] &= (contact == 0) | (distance["inner"] < 2.0)
+        integrals = integral_images(image_channels(region.crop(frame.linear_rgb)))
+        examples.append(_Example(integrals, distance, usable))
+    return examples
+
+
+def _jitter(random: np.random.Generator, mirrored: bool) -> np.ndarray:
+    """A small change of scale and roll, mirrored or not, (2, 2)."""
+    angle, scale = random.normal(0.0, 0.07), np.exp(random.normal(0.0, 0.06))
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return scale * rotation @ np.diag([-1.0 if mirrored else 1.0, 1.0])
+
+
+def _train_one(
+    examples: Sequence[_Example],
+    name: str,
+    pool: FeaturePool,
+    settings: TrainingSettings,
+    random: np.random.Generator,
+) -> Forest:
+    chosen = [_first_samples(example, name, settings, random) for example in examples]
+    share = min(1.0, settings.max_samples / max(sum(mask.sum() for mask in chosen), 1))
+    chosen = [mask & (random.random(mask.shape) < share) for mask in chosen]
+    edges = bin_edges(_some_values(examples, chosen, pool))
+    codes, labels = _collect(examples, chosen, name, pool, edges, settings)
+    for round_ in range(settings.hard_rounds + 1):
+        forest = fit_forest(pool, codes, edges, labels, _balanced(labels), settings.boosting)
+        if round_ == settings.hard_rounds:
+            break
+        hard = [_hard_samples(example, name, forest, settings) for example in examples]
+        found = sum(mask.sum() for mask in hard)
+        if found < 0.002 * len(labels):
+            break
+        keep = min(1.0, 0.5 * settings.max_samples / found)
+        hard = [mask & (random.random(mask.shape) < keep) for mask in hard]
+        more, more_labels = _collect(examples, hard, name, pool, edges, settings)
+        codes = np.concatenate([codes, more], axis=1)
+        labels = np.concatenate([labels, more_labels])
+    return forest
+
+
+def _first_samples(
+    example: _Example, name: str, settings: TrainingSettings, random: np.random.Generator
+) -> np.ndarray:
+    """Every pixel near the contour, half of those a little farther, a few of the rest."""
+    distance = example.distance[name]
+    near = distance < 2.0 * settings.label_px
+    beside = distance < 8.0 * settings.label_px
+    draw = random.random(distance.shape)
+    chosen = near | (beside & (draw < 0.4)) | (draw < settings.far_share)
+    return chosen & example.usable[name]
+
+
+def _hard_samples(
+    example: _Example, name: str, forest: Forest, settings: TrainingSettings
+) -> np.ndarray:
+    """Pixels farther than three deviations from the contour that look like contour."""
+    rows, columns = np.nonzero(example.usable[name])
+    log_odds = forest.log_odds(example.integrals, columns, rows)
+    hard = np.zeros(example.usable[name].shape, dtype=bool)
+    hard[rows, columns] = log_odds > 0.0
+    return hard & (example.distance[name] > 3.0 * settings.label_px)
+
+
+def _some_values(
+    examples: Sequence[_Example], chosen: Sequence[np.ndarray], pool: FeaturePool
+) -> np.ndarray:
+    """Features (N, n) of about 4000 of the samples, evenly taken: enough for their quantiles."""
+    step = max(sum(int(mask.sum()) for mask in chosen) // 4000, 1)
+    values = []
+    for example, mask in zip(examples, chosen, strict=True):
+        rows, columns = np.nonzero(mask)
+        values.append(pool.evaluate(example.integrals, columns[::step], rows[::step]))
+    return np.concatenate(values, axis=1)
+
+
+def _collect(
+    examples: Sequence[_Example],
+    chosen: Sequence[np.ndarray],
+    name: str,
+    pool: FeaturePool,
+    edges: np.ndarray,
+    settings: TrainingSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Binned features (N, n) and soft labels (n,) of the chosen pixels."""
+    codes, labels = [], []
+    for example, mask in zip(examples, chosen, strict=True):
+        rows, columns = np.nonzero(mask)
+        codes.append(bin_features(pool, edges, example.integrals, columns, rows))
+        distance = example.distance[name][rows, columns]
+        labels.append(np.exp(-0.5 * (distance / settings.label_px) ** 2))
+    return np.concatenate(codes, axis=1), np.concatenate(labels)
+
+
+def _balanced(labels: np.ndarray) -> np.ndarray:
+    """Weights that give contour and the rest a like share, mean 1."""
+    positive, negative = labels.sum(), (1 - labels).sum()
+    weights = labels / max(positive, 1e-9) + (1 - labels) / max(negative, 1e-9)
+    return weights * len(labels) / weights.sum()

@@ -1,0 +1,85 @@
+"""Lip contours (Lips16 3.2.2): detectors of an illumination, likelihood maps of every frame."""
+
+from vermilion.contours.labels import label_paths
+
+
+def contour_labels(wildcards):
+    """Contours drawn on frames of the take's monocular camera, where the capture exists already.
+
+    The studio's labels appear with its frames, on which the manifests depend.
+    """
+    take = take_of(wildcards)
+    if take.source == STUDIO:
+        return []
+    labels = label_paths(take.source, mono_camera(wildcards))
+    return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
+
+
+def mono_pictures(wildcards):
+    """Checked manifests of all chunks of a take, and its inpainted frames if it has a tattoo."""
+    folder = R + "/takes/{subject}/{take}"
+    name = (wildcards.subject, wildcards.take)
+    inputs = expand_chunks(folder + "/capture/{chunk}.json", *name)
+    if take_of(wildcards).role == "tattoo":
+        inputs += expand_chunks(folder + "/inpaint/{chunk}", *name)
+    return inputs
+
+
+def mono_sources(wildcards):
+    """What `open_frames` opens for the monocular pictures of a whole take."""
+    if take_of(wildcards).role == "tattoo":
+        pattern = R + "/takes/{subject}/{take}/inpaint/{chunk}"
+        return expand_chunks(pattern, wildcards.subject, wildcards.take)
+    return source_of(wildcards)
+
+
+rule contour_detector:
+    """Trains the inner and outer contour detectors of a take: contours/detector.npz."""
+    input:
+        pictures=mono_pictures,
+        landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
+        labels=contour_labels,
+    output:
+        detector=R + "/takes/{subject}/{take}/contours/detector.npz",
+    log:
+        R + "/logs/contour_detector/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/contour_detector/{subject}-{take}.tsv"
+    params:
+        cfg=cfg_of("contours.detector"),
+        code=code_of("contour_detector"),
+        source=mono_sources,
+        capture=source_of,
+        camera=mono_camera,
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    script:
+        "../scripts/contour_detector.py"
+
+
+rule contours:
+    """Draws the likelihood maps of a chunk: contours/{chunk}/<frame>.exr, inner and outer."""
+    input:
+        unpack(mono_inputs),
+        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
+        detector=R + "/takes/{subject}/{take}/contours/detector.npz",
+    output:
+        maps=directory(R + "/takes/{subject}/{take}/contours/{chunk}"),
+        quality=R + "/takes/{subject}/{take}/contours/quality/{chunk}.tsv",
+        overlay=R + "/takes/{subject}/{take}/contours/overlay/{chunk}.png",
+    log:
+        R + "/logs/contours/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/contours/{subject}-{take}-{chunk}.tsv"
+    params:
+        cfg=cfg_of("contours.maps"),
+        code=code_of("contours"),
+        source=mono_source,
+        capture=source_of,
+        camera=mono_camera,
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    script:
+        "../scripts/contours.py"
