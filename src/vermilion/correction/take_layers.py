@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -10,6 +12,8 @@ import numpy as np
 from vermilion.correction.head import align_frames, head_from_world
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
+from vermilion.files import atomic_path
+from vermilion.quality import QualityRow
 
 
 @dataclass(frozen=True)
@@ -80,3 +84,55 @@ def take_layers(
         strength=np.sqrt((layers.astype(np.float64) ** 2).mean(axis=(1, 2))),
         folded=(turn > np.pi / 2).mean(axis=1),
     )
+
+
+def quality_rows(
+    made: TakeLayers,
+    frames: Sequence[int],
+    *,
+    tracked: np.ndarray,
+    reconstructed: np.ndarray,
+    max_alignment_mm: float,
+) -> tuple[TakeLayers, list[QualityRow]]:
+    """Flag the frames that no regressor may learn from, with the reason.
+
+    Args:
+        tracked, reconstructed: (F,) bool, what the earlier stages say of C and H.
+        max_alignment_mm: of the rigid regions against each other (RMS).
+
+    Returns:
+        (layers with `valid` narrowed, a row a frame).
+    """
+    rows, valid = [], made.valid.copy()
+    for k, frame in enumerate(frames):
+        reason = ""
+        if not tracked[k]:
+            reason = "the coarse track failed"
+        elif not reconstructed[k]:
+            reason = "the accurate mesh failed"
+        elif not made.valid[k]:
+            reason = "a mesh with vertices that are not finite"
+        elif made.alignment_mm[k] > max_alignment_mm:
+            reason = f"rigid regions {made.alignment_mm[k]:.1f} mm apart"
+        figures = {
+            "alignment_mm": float(made.alignment_mm[k]),
+            "strength": float(made.strength[k]),
+            "folded_share": float(made.folded[k]),
+        }
+        valid[k] = not reason
+        rows.append(QualityRow(int(frame), not reason, reason, figures))
+    return replace(made, valid=valid), rows
+
+
+def save_layers(
+    path: str | Path, made: TakeLayers, frames: Sequence[int], mask: np.ndarray
+) -> None:
+    """Write frames (F,), layers (F, T, 9), mask (T,) and valid (F,) as `.npz`."""
+    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+        np.savez(
+            stream,
+            frames=np.asarray(frames, dtype=np.int32),
+            layers=made.layers,
+            mask=np.asarray(mask, dtype=np.int32),
+            valid=made.valid,
+        )

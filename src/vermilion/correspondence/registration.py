@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.correspondence.surface_map import SurfaceMap, closest_on_surface
-from vermilion.mesh import Mesh, vertex_areas, vertex_normals
+from vermilion.mesh import Mesh, boundary_edges, vertex_areas, vertex_normals
 from vermilion.sparse import CholeskyFactor, cotangent_laplacian
 
 
@@ -65,7 +65,7 @@ def register(
     sides_accurate: np.ndarray | None = None,
     landmark_weight: float = 0.3,
     smoothing_lengths_mm: Sequence[float] = (20.0, 12.0, 8.0, 5.0, 5.0),
-    max_distance_mm: float = 10.0,
+    search_distance_mm: float = 10.0,
     max_angle_deg: float = 70.0,
 ) -> Mesh:
     """The coarse mesh laid over the accurate one, in the accurate one's frame.
@@ -77,7 +77,7 @@ def register(
         sides_coarse, sides_accurate: (V,) in -1, 0, 1: lower lip, neither, upper lip.
         landmark_weight: weight of a landmark beside bending (1 / mm^2).
         smoothing_lengths_mm: one dense step each; differences narrower than this are smoothed.
-        max_distance_mm: farther closest points are no targets.
+        search_distance_mm: farther closest points are no targets.
         max_angle_deg: between the normals of a vertex and its target.
 
     Raises:
@@ -108,7 +108,7 @@ def register(
             sides=sides_coarse,
             triangle_sides=triangle_sides,
         )
-        used = targets.bound & (distance < max_distance_mm) & ~_on_border(targets, accurate)
+        used = targets.bound & (distance < search_distance_mm) & ~_on_border(targets, accurate)
         found = targets.sample(accurate.vertices_mm, accurate.triangles)
         residuals = np.where(used[:, None], found - placed.vertices_mm, 0.0)
         # Landmarks guide the first steps and fade: the surfaces say more than single pixels.
@@ -129,8 +129,6 @@ def sides_of_triangles(mesh: Mesh, sides: np.ndarray) -> np.ndarray:
 
 def _on_border(points: SurfaceMap, mesh: Mesh) -> np.ndarray:
     """Points on the mesh's border: the closest of a surface that goes on beyond it, so no match."""
-    from vermilion.mesh import boundary_edges
-
     border = np.zeros(len(mesh.vertices_mm), dtype=bool)
     border[boundary_edges(mesh.triangles)] = True
     corners = mesh.triangles[np.maximum(points.triangle, 0)]

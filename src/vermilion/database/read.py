@@ -11,6 +11,9 @@ import numpy as np
 from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry, TrainingSet
 from vermilion.errors import InputError
 
+#: Fewer frames cannot be cross-validated.
+MIN_FRAMES = 5
+
 
 class LipDatabase:
     """`lips.h5`, open for reading; use as a context manager.
@@ -82,7 +85,7 @@ class LipDatabase:
     def training_set(self, subjects: Collection[str]) -> TrainingSet:
         """The valid training frames of some subjects.
 
-        Raises InputError where there are fewer than ten.
+        Raises InputError where there are fewer than `MIN_FRAMES`.
         """
         chosen = [(s, t) for s, t in self.takes if s in subjects]
         rows = []
@@ -90,10 +93,10 @@ class LipDatabase:
             group = self._file[f"takes/{subject}/{take}"]
             rows.append(np.flatnonzero(group["valid"][:] & group["train"][:]))
         total = sum(len(r) for r in rows)
-        if total < 10:
+        if total < MIN_FRAMES:
             raise InputError(
                 f"{total} valid training frames of {', '.join(sorted(subjects)) or 'no subject'}",
-                "at least 10",
+                f"at least {MIN_FRAMES}",
                 "Give a take of role `tattoo` with split `train` or `test:A-B`, and look at the "
                 "quality table for frames that failed.",
             )

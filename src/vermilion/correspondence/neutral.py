@@ -1,0 +1,173 @@
+"""The correspondence of a take's neutral frame: from tracked meshes and a picture's landmarks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.correction.head import head_from_world
+from vermilion.correspondence.correspondence import (
+    Correspondence,
+    find_correspondence,
+    flipped_triangles,
+)
+from vermilion.correspondence.landmarks import LIPS, back_project, inner_features
+from vermilion.correspondence.surface_map import SurfaceMap, at_vertices
+from vermilion.errors import InputError
+from vermilion.faces.model import FaceModel
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.mesh import Mesh
+from vermilion.quality import QualityRow
+from vermilion.tracking.result import TrackedTake
+
+
+@dataclass(frozen=True)
+class Neutral:
+    """A take's first frame.
+
+    Attributes:
+        coarse: C in the world.
+        accurate: H in the world.
+        camera: of the monocular pictures.
+        points_px: (66, 2) landmarks of its picture.
+        rotation, translation_mm: (3, 3), (3,) `world_from_head` of the tracker.
+        subject, take: for messages.
+    """
+
+    coarse: Mesh
+    accurate: Mesh
+    camera: Camera
+    points_px: np.ndarray
+    rotation: np.ndarray
+    translation_mm: np.ndarray
+    subject: str
+    take: str
+
+    @classmethod
+    def of(
+        cls,
+        coarse: Mesh,
+        accurate: Mesh,
+        fit: TrackedTake,
+        track: LandmarkTrack,
+        *,
+        subject: str,
+        take: str,
+    ) -> Neutral:
+        """Take the first frame. Raises InputError where it was not tracked."""
+        frame = int(fit.frames[0])
+        row = np.flatnonzero(track.frames == frame)
+        if not fit.valid[0] or not len(row) or not track.valid[row[0]]:
+            raise InputError(
+                "a first frame that was not tracked",
+                "the neutral, with a face that landmarks are found on",
+                "Look at the take's landmark and tracking overlays; start the take at a frame that "
+                "shows the neutral face.",
+                subject=subject,
+                take=take,
+                frame=frame,
+            )
+        return cls(
+            coarse=coarse,
+            accurate=accurate,
+            camera=fit.camera,
+            points_px=np.asarray(track.points_px[row[0]], np.float64),
+            rotation=fit.world_from_head_rotation[0],
+            translation_mm=fit.world_from_head_translation_mm[0],
+            subject=subject,
+            take=take,
+        )
+
+
+def correspond_neutrals(
+    neutral: Neutral,
+    tracker: FaceModel,
+    template: FaceModel,
+    *,
+    landmarks: str = "picture",
+    search_distance_mm: float = 10.0,
+    max_distance_mm: float = 4.0,
+    **settings,
+) -> tuple[Correspondence, Mesh, tuple[SurfaceMap, SurfaceMap]]:
+    """Find the correspondence of a subject.
+
+    Args:
+        tracker, template: models of C's and H's topology, for regions.
+        landmarks: `picture` or `model`, see the configuration.
+        search_distance_mm, max_distance_mm: during registration, and once registered.
+        settings: others of `find_correspondence` and `register`.
+
+    Returns:
+        (correspondence, C registered over H in H's world, landmarks on C and H).
+
+    Raises:
+        InputError: too few landmarks on both meshes, or no mouth in common.
+    """
+    coarse, accurate = neutral.coarse, neutral.accurate
+    seen = [
+        inner_features(back_project(neutral.points_px, neutral.camera, mesh))
+        for mesh in (coarse, accurate)
+    ]
+    if landmarks == "model":
+        seen = [
+            inner_features(at_vertices(model.landmarks, model.triangles))
+            for model in (tracker, template)
+        ]
+    in_head = coarse.with_vertices(
+        head_from_world(
+            coarse.vertices_mm[None], neutral.rotation[None], neutral.translation_mm[None]
+        )[0]
+    )
+    lips = seen[0].sample(in_head.vertices_mm, coarse.triangles)[LIPS]
+    place = {"subject": neutral.subject, "take": neutral.take}
+    if not np.isfinite(lips).all(axis=1).any():
+        raise InputError(
+            "no lip landmark whose ray meets the coarse mesh",
+            "a tracked mouth",
+            "Look at the take's tracking overlay: the mesh does not lie over the face.",
+            **place,
+        )
+    try:
+        found, registered = find_correspondence(
+            in_head,
+            accurate,
+            *seen,
+            np.nanmean(lips, axis=0),
+            coarse_regions=tracker.regions,
+            accurate_regions=template.regions,
+            max_distance_mm=max_distance_mm,
+            search_distance_mm=search_distance_mm,
+            **settings,
+        )
+    except ValueError as error:
+        raise InputError(
+            str(error),
+            "two neutrals of the same face",
+            "Look at the take's tracking and multiview overlays.",
+            **place,
+        ) from error
+    return found, registered, (seen[0], seen[1])
+
+
+def quality_of(found: Correspondence, registered: Mesh, accurate: Mesh, frame: int) -> QualityRow:
+    """Coverage, distances and folds of the mask; a row with a reason where they look wrong."""
+    corners = found.coarse_triangles[found.mask]
+    vertices = np.unique(corners)
+    distance = found.distance_mm[vertices].astype(np.float64)
+    flipped = flipped_triangles(registered, found.on_coarse(accurate.vertices_mm))
+    bound = found.vertices.bound
+    figures = {
+        "mask_triangles": len(found.mask),
+        "bound_share": float(bound.mean()),
+        "distance_mean_mm": float(distance.mean()),
+        "distance_p95_mm": float(np.percentile(distance, 95)),
+        "flipped_triangles": int(flipped[bound[found.coarse_triangles].all(axis=1)].sum()),
+    }
+    reasons = []
+    if figures["bound_share"] < 0.6:
+        reasons.append(f"only {figures['bound_share']:.0%} of the coarse mesh has a counterpart")
+    if figures["distance_p95_mm"] > 2.0:
+        reasons.append(f"95 % of distances reach {figures['distance_p95_mm']:.1f} mm")
+    return QualityRow(frame, not reasons, "; ".join(reasons), figures)

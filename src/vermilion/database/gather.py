@@ -1,0 +1,78 @@
+"""A take's layers and features, from its chunks to one entry of the database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.database.schema import TakeEntry
+from vermilion.errors import InputError
+
+
+@dataclass(frozen=True)
+class TakeFiles:
+    """A take as read: its entry and the names of its features."""
+
+    entry: TakeEntry
+    feature_names: tuple[str, ...]
+
+
+def read_take_files(
+    row: Mapping, layer_paths: Sequence[str | Path], feature_paths: Sequence[str | Path]
+) -> TakeFiles:
+    """Join the chunks of a take, in order.
+
+    Args:
+        row: subject, take, fps, split, and `train`, the frame numbers that train.
+        layer_paths, feature_paths: chunk files with `frames`, `valid` and `layers` or `features`.
+
+    Raises InputError where the chunks disagree about frames or features.
+    """
+    place = {"subject": row["subject"], "take": row["take"]}
+    layers = [_load(path, ("frames", "layers", "valid"), place) for path in layer_paths]
+    features = [_load(path, ("frames", "features", "valid"), place) for path in feature_paths]
+    frames = np.concatenate([part["frames"] for part in layers])
+    others = np.concatenate([part["frames"] for part in features])
+    if not np.array_equal(frames, others):
+        raise InputError(
+            f"layers of {len(frames)} frames and features of {len(others)}",
+            "the same frames",
+            "Remove the take's `correction` folder and run again.",
+            **place,
+        )
+    values = np.concatenate([part["features"] for part in features])
+    valid = np.concatenate([part["valid"] for part in layers])
+    valid &= np.concatenate([part["valid"] for part in features]) & np.isfinite(values).all(axis=1)
+    entry = TakeEntry(
+        **place,
+        fps=row["fps"],
+        split=row["split"],
+        frames=frames,
+        features=np.where(valid[:, None], values, 0.0),
+        layers=np.concatenate([part["layers"] for part in layers]),
+        valid=valid,
+        train=np.isin(frames, row["train"]),
+    )
+    names = features[0].get("names", np.array([f"feature_{i}" for i in range(values.shape[1])]))
+    return TakeFiles(entry, tuple(str(name) for name in names))
+
+
+def _load(path: str | Path, needed: Sequence[str], place: Mapping) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        missing = [name for name in needed if name not in arrays]
+    except (OSError, ValueError, EOFError) as error:
+        arrays, missing = {}, [str(error)]
+    if missing:
+        raise InputError(
+            f"a file without {', '.join(missing)}",
+            f"arrays {', '.join(needed)}",
+            "Remove the file and run again.",
+            path=path,
+            **place,
+        )
+    return arrays

@@ -1,0 +1,27 @@
+"""One regressor, its cross-validation curve and that curve's picture."""
+
+from vermilion.config.training import TrainingConfig
+from vermilion.database.read import LipDatabase
+from vermilion.logfile import log_to
+from vermilion.regression.figures import plot_curve
+from vermilion.regression.model import save_model
+from vermilion.regression.training import Selection, curve_table, train, training_subjects
+from vermilion.tables import write_table
+
+
+def main(snakemake):
+    name, output = snakemake.wildcards.regressor, snakemake.output
+    selection = Selection(**TrainingConfig(**snakemake.params.cfg["training"]).model_dump())
+    with LipDatabase(snakemake.input[0]) as database:
+        data = database.training_set(training_subjects(name, database.subjects))
+        place = (database.feature_names, database.mask, database.area_mm2, database.topology)
+    model, curve = train(name, data, *place, selection)
+    print(curve_table(name, curve).to_string())
+    write_table(output.curve, curve_table(name, curve))
+    plot_curve(output.picture, name, curve)
+    save_model(output.model, model)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
