@@ -82,7 +82,7 @@ class LandmarkTrainingConfig(StageConfig):
         description="Labelled pictures that are used, evenly spread over all (count).",
     )
     found_threshold: float = Field(
-        0.5, ge=0.0, le=1.0, description="Least mean confidence of a face's landmarks (0 to 1)."
+        0.35, ge=0.0, le=1.0, description="Least mean confidence of a face's landmarks (0 to 1)."
     )
     seed: int = Field(0, ge=0, description="Seed of the starting shapes.")
 

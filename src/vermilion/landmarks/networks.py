@@ -65,9 +65,7 @@ class NetworkDetector:
         height, width = picture.shape[:2]
         scores, peaks = _run(self._face, picture)
         score, radius = scores[0], scores[1] * 112.0
-        rows, columns = np.nonzero(
-            (score == peaks[0]) & (score >= self.settings.face_threshold)
-        )
+        rows, columns = np.nonzero((score == peaks[0]) & (score >= self.settings.face_threshold))
         boxes = []
         for row, column in zip(rows, columns, strict=True):
             r = radius[row, column]
@@ -145,9 +143,7 @@ def _session(path: Path):
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3
     try:
-        return onnxruntime.InferenceSession(
-            str(path), options, providers=["CPUExecutionProvider"]
-        )
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises several kinds
         raise InputError(
             f"a network that cannot be loaded ({error})",

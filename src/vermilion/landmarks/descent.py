@@ -1,0 +1,167 @@
+"""Landmarks by supervised descent (Xiong and De la Torre 2013): linear steps in a row.
+
+The picture is brought to the mean shape's place, size and turn; gradient histograms round the
+current points predict how each should move. Started from the likeliest faces, the surest wins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from vermilion.errors import ModelFileError
+from vermilion.files import atomic_path
+from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
+from vermilion.landmarks.locate import FaceLocator
+from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
+
+FORMAT_VERSION = 1
+CELLS = 4
+#: Pixels between the cells of a patch, and blur, in the upright picture.
+SPACING_PX, BLUR_PX = 4.0, 1.8
+N_FEATURES = N_LANDMARKS * CELLS * CELLS * 8
+
+
+def stage_sizes(n_stages: int) -> tuple[int, ...]:
+    """Face size in pixels of the upright picture at each stage: coarse to fine."""
+    return tuple(int(s) for s in np.rint(np.geomspace(56, 112, n_stages)))
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Picture pixels = scale * turn @ upright + shift, turn by (cos, sin) in `matrix` (2, 2)."""
+
+    matrix: np.ndarray
+    shift: np.ndarray
+
+    @classmethod
+    def between(cls, source: np.ndarray, target: np.ndarray) -> Similarity:
+        """Least squares, of points (N, 2) to points (N, 2)."""
+        a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+        za, zb = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
+        z = (np.conj(za) @ zb) / max(np.real(np.conj(za) @ za), 1e-12)
+        matrix = np.array([[z.real, -z.imag], [z.imag, z.real]])
+        return cls(matrix, target.mean(axis=0) - matrix @ source.mean(axis=0))
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        return points @ self.matrix.T + self.shift
+
+
+def upright_channels(grey: np.ndarray, to_picture: Similarity, size_px: int) -> np.ndarray:
+    """Blurred orientation channels of the picture resampled into the mean shape's frame.
+
+    The mean shape has size 1 about the origin; `size_px` pixels are 1, the origin in the middle.
+    """
+    side = round(1.9 * size_px)
+    scale = np.sqrt(abs(np.linalg.det(to_picture.matrix))) / size_px
+    image, shrink = grey, 1.0
+    while scale * shrink > 2.0 and min(image.shape) > 32:
+        image, shrink = cv2.pyrDown(image), shrink * 0.5
+    matrix = to_picture.matrix / size_px
+    corner = to_picture.shift - matrix @ np.array([side / 2, side / 2])
+    # Pixel centres: OpenCV's are whole numbers, ours lie half a pixel further.
+    affine = np.concatenate([matrix, (corner + matrix @ [0.5, 0.5])[:, None]], axis=1) * shrink
+    affine[:, 2] -= 0.5
+    upright = cv2.warpAffine(
+        image,
+        affine,
+        (side, side),
+        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return cv2.GaussianBlur(orientation_channels(upright), (0, 0), BLUR_PX)
+
+
+def shape_features(grey: np.ndarray, shape: np.ndarray, mean: np.ndarray, size_px: int):
+    """Features (66, 128) round a shape (66, 2) px, and the similarity from the mean's frame."""
+    to_picture = Similarity.between(mean, shape)
+    channels = upright_channels(grey, to_picture, size_px)
+    local = (shape - to_picture.shift) @ np.linalg.inv(to_picture.matrix).T
+    pixels = local * size_px + channels.shape[0] / 2 - 0.5
+    return patch_features(channels, pixels, CELLS, SPACING_PX), to_picture
+
+
+@dataclass(frozen=True)
+class DescentDetector:
+    """The trained regressor.
+
+    Attributes:
+        mean: (66, 2) mean shape, size 1 about the origin of its bounding box.
+        steps: (S, N_FEATURES + 1, 132) float32: each stage's regression, the offset last.
+        sureness: (66, 129) how near a point is, from its patch; the offset last.
+        locator: finds where to start.
+        found_threshold: least mean confidence.
+    """
+
+    mean: np.ndarray
+    steps: np.ndarray
+    sureness: np.ndarray
+    locator: FaceLocator
+    found_threshold: float
+
+    def detect(self, linear_rgb: np.ndarray) -> Landmarks:
+        """Landmarks of the surest face; see `Landmarks`."""
+        grey = grey_of(linear_rgb)
+        best = Landmarks.none()
+        for centre, size, _ in self.locator.locate(grey):
+            found = self.refine(grey, self.mean * size + centre)
+            if found.confidence.mean() > best.confidence.mean():
+                best = found
+            if best.confidence.mean() > 0.5 * (1 + self.found_threshold):
+                break
+        return best if best.confidence.mean() >= self.found_threshold else Landmarks.none()
+
+    def refine(self, grey: np.ndarray, shape: np.ndarray) -> Landmarks:
+        """All stages from a starting shape (66, 2) px, and how sure each point is."""
+        sizes = stage_sizes(len(self.steps))
+        for size_px, step in zip(sizes, self.steps, strict=True):
+            features, to_picture = shape_features(grey, shape, self.mean, size_px)
+            move = features.reshape(-1) @ step[:-1] + step[-1]
+            shape = shape + move.reshape(-1, 2) @ to_picture.matrix.T
+            if not np.isfinite(shape).all() or face_size_px(shape) < 8:
+                return Landmarks.none()
+        features, _ = shape_features(grey, shape, self.mean, sizes[-1])
+        sure = (features * self.sureness[:, :-1]).sum(axis=1) + self.sureness[:, -1]
+        return Landmarks(shape, np.clip(sure, 0.0, 1.0).astype(np.float64), True)
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz` (no pickle), whole or not at all."""
+        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+            np.savez(
+                stream,
+                format_version=FORMAT_VERSION,
+                mean=self.mean,
+                steps=self.steps.astype(np.float16),
+                sureness=self.sureness.astype(np.float32),
+                locator_weights=self.locator.weights,
+                locator_bias=self.locator.bias,
+                found_threshold=self.found_threshold,
+            )
+
+    @classmethod
+    def load(cls, path: str | Path) -> DescentDetector:
+        """Read what `save` wrote. Raises ModelFileError on another or damaged file."""
+        hint = "Remove the file and run again."
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                arrays = {key: data[key] for key in data.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise ModelFileError(
+                f"an unreadable landmark model ({error})", "a .npz", hint, path=path
+            ) from error
+        version = int(arrays.get("format_version", -1))
+        if version != FORMAT_VERSION:
+            raise ModelFileError(
+                f"landmark model format {version}", f"format {FORMAT_VERSION}", hint, path=path
+            )
+        return cls(
+            arrays["mean"],
+            arrays["steps"].astype(np.float32),
+            arrays["sureness"],
+            FaceLocator(arrays["locator_weights"], float(arrays["locator_bias"])),
+            float(arrays["found_threshold"]),
+        )

@@ -1,0 +1,76 @@
+"""Landmarks of the frames of a take, each flagged where no face was found or no picture read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.errors import InputError
+from vermilion.frames import FrameSource
+from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
+from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
+from vermilion.progress import progress
+from vermilion.quality import QualityRow
+
+NOT_FOUND = "no face found"
+
+
+def detect_frames(
+    find: Callable[[int], Landmarks], frames: Sequence[int]
+) -> tuple[LandmarkTrack, list[QualityRow]]:
+    """Landmarks of some frames, and a quality row each.
+
+    Args:
+        find: landmarks of a frame; may raise InputError, which flags the frame.
+        frames: frame numbers.
+    """
+    entries, rows = [], []
+    for frame in progress(frames, "landmarks"):
+        reason = NOT_FOUND
+        try:
+            entry = find(frame)
+        except InputError as error:
+            entry, reason = Landmarks.none(), str(error)
+        confidence = {"confidence": round(float(entry.confidence.mean()), 4)}
+        rows.append(QualityRow(frame, entry.found, "" if entry.found else reason, confidence))
+        entries.append(entry)
+    return LandmarkTrack.of(frames, entries), rows
+
+
+def finder(
+    source: FrameSource, camera: str, detector: LandmarkDetector
+) -> Callable[[int], Landmarks]:
+    """The landmarks of a frame, from its picture."""
+    return lambda frame: detector.detect(source.read(camera, frame))
+
+
+def landmark_overlay(
+    source: FrameSource, camera: str, track: LandmarkTrack, count: int = 8, columns: int = 4
+) -> np.ndarray:
+    """Frames of a track, evenly spread, with their landmarks; (h, w, 3) uint8."""
+    rows = np.unique(np.linspace(0, len(track.frames) - 1, count).round().astype(int))
+    pictures = []
+    for row in rows:
+        frame = int(track.frames[row])
+        try:
+            picture = to_display(source.read(camera, frame))
+        except InputError:
+            picture = np.zeros((240, 320, 3), dtype=np.uint8)
+        found = Landmarks(track.points_px[row], track.confidence[row], bool(track.valid[row]))
+        text = f"{frame}" if found.found else f"{frame}: {NOT_FOUND}"
+        pictures.append(label(draw_landmarks(picture, found), text))
+    return tile(pictures, columns)
+
+
+def draw_landmarks(picture: np.ndarray, found: Landmarks) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
+    if not found.found:
+        return picture
+    radius = max(1, round(picture.shape[1] / 400))
+    for loop in (LIP_OUTER, LIP_INNER):
+        picture = draw_polyline(picture, found.points_px[loop], (255, 255, 0))
+    sure = found.confidence >= 0.5
+    picture = draw_points(picture, found.points_px[sure], (0, 255, 0), radius)
+    return draw_points(picture, found.points_px[~sure], (255, 0, 0), radius)

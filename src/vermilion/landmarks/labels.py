@@ -1,0 +1,61 @@
+"""Landmarks that a person drew: `labels/landmarks/<camera>/<frame>.json` of a capture folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.errors import InputError
+from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
+
+
+@dataclass(frozen=True)
+class LandmarkLabel:
+    """One labelled picture: camera, frame, points (66, 2) in pixels."""
+
+    camera: str
+    frame: int
+    points_px: np.ndarray
+
+
+def label_files(capture: str | Path) -> list[Path]:
+    """Label files of a capture folder, sorted by camera and frame."""
+    return sorted((Path(capture) / "labels" / "landmarks").glob("*/*.json"))
+
+
+def read_label(path: str | Path) -> LandmarkLabel:
+    """Read one file of 66 points (or 68, whose inner mouth corners are left out)."""
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        points = np.asarray(content["points"], dtype=np.float64)
+        frame = int(path.stem)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"an unreadable landmark label ({error})",
+            '{"unit": "px", "image": ..., "points": [[x, y] * 66]} in a file named by its frame',
+            "Correct or remove the file.",
+            path=path,
+        ) from error
+    if points.shape == (68, 2):
+        points = points[FROM_68]
+    if points.shape != (N_LANDMARKS, 2) or not np.isfinite(points).all():
+        raise InputError(
+            f"points of shape {points.shape}",
+            "66 finite points (x, y) in pixels",
+            "Correct or remove the file.",
+            camera=path.parent.name,
+            frame=frame,
+            path=path,
+        )
+    return LandmarkLabel(path.parent.name, frame, points)
+
+
+def read_labels(capture: str | Path) -> Iterator[LandmarkLabel]:
+    """All labels of a capture folder."""
+    for path in label_files(capture):
+        yield read_label(path)

@@ -1,0 +1,137 @@
+"""66 landmarks a frame (Mono13 5.1): by a trained regressor, by networks, or from files."""
+
+from vermilion.landmarks.labels import label_files
+from vermilion.landmarks.networks import FACE_FILE, LANDMARK_FILE
+
+LANDMARK_MODEL = R + "/landmarks/model.npz"
+
+
+def detector_files(wildcards):
+    """What the configured detector reads: its model or networks; nothing for CSV files."""
+    kind, folder = CONFIG.landmarks.detector, Path(CONFIG.landmarks.models)
+    if kind == "onnx":
+        return [str(folder / FACE_FILE), str(folder / LANDMARK_FILE)]
+    return [LANDMARK_MODEL] if kind == "trained" else []
+
+
+def detector_path(wildcards):
+    """The folder of networks or the file of the regressor."""
+    return CONFIG.landmarks.models if CONFIG.landmarks.detector == "onnx" else LANDMARK_MODEL
+
+
+def landmark_csv(wildcards, camera):
+    """The file of another tracker that holds a take's landmarks in one camera."""
+    return CONFIG.landmarks.csv.path.format(
+        subject=wildcards.subject, take=wildcards.take, camera=camera
+    )
+
+
+def landmark_csv_input(wildcards):
+    if CONFIG.landmarks.detector != "csv":
+        return []
+    return landmark_csv(wildcards, mono_camera(wildcards))
+
+
+def training_takes():
+    """Rows of the takes with labelled landmarks."""
+    wanted = CONFIG.landmarks.training_takes
+    missing = sorted(set(wanted) - {take.name for take in TAKES})
+    if missing or not wanted:
+        raise WorkflowError(
+            f"landmarks.training_takes: found {missing or 'none'}, expected names of takes as "
+            f"subject/take that are in {CONFIG.takes}. Name them, or set landmarks.detector."
+        )
+    return [take for take in TAKES if take.name in wanted]
+
+
+def landmark_model_inputs(wildcards):
+    """Checked frames of the training takes, and the labels of captures that exist."""
+    inputs = []
+    for take in training_takes():
+        pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
+        inputs += expand_chunks(pattern, take.subject, take.take)
+        if take.source != STUDIO:
+            inputs += [str(path) for path in label_files(take.source)]
+    return inputs
+
+
+rule landmark_model:
+    """Trains the landmark regressor on labelled frames of other takes: landmarks/model.npz."""
+    input:
+        landmark_model_inputs,
+    output:
+        model=LANDMARK_MODEL,
+        overlay=R + "/landmarks/overlay.png",
+    log:
+        R + "/logs/landmark_model.log",
+    benchmark:
+        R + "/benchmarks/landmark_model.tsv"
+    resources:
+        mem_mb=2500,
+        runtime=60,
+    params:
+        cfg=cfg_of("landmarks.training"),
+        code=code_of("landmark_model"),
+        takes=lambda wildcards: [
+            {"subject": t.subject, "take": t.take, "source": source_of(t)}
+            for t in training_takes()
+        ],
+    script:
+        "../scripts/landmark_model.py"
+
+
+rule landmarks:
+    """Finds the landmarks of a chunk of the monocular pictures: landmarks/{chunk}.npz."""
+    input:
+        unpack(mono_inputs),
+        detector=detector_files,
+        csv=landmark_csv_input,
+    output:
+        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
+        quality=R + "/takes/{subject}/{take}/landmarks/quality/{chunk}.tsv",
+        overlay=R + "/takes/{subject}/{take}/landmarks/overlay/{chunk}.png",
+    log:
+        R + "/logs/landmarks/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/landmarks/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
+        code=code_of("landmarks"),
+        source=mono_source,
+        camera=mono_camera,
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+        model=detector_path,
+    script:
+        "../scripts/landmarks.py"
+
+
+rule landmarks_views:
+    """Finds the landmarks of the neutral in every camera of a rig: views_neutral.npz."""
+    input:
+        manifest=lambda wildcards: expand_chunks(
+            R + "/takes/{subject}/{take}/capture/{chunk}.json", wildcards.subject, wildcards.take
+        )[0],
+        cameras=R + "/takes/{subject}/{take}/cameras",
+        detector=detector_files,
+    output:
+        views=R + "/takes/{subject}/{take}/landmarks/views_neutral.npz",
+        overlay=R + "/takes/{subject}/{take}/landmarks/overlay/views_neutral.png",
+    log:
+        R + "/logs/landmarks_views/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/landmarks_views/{subject}-{take}.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    params:
+        cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
+        code=code_of("landmarks_views"),
+        source=source_of,
+        frame=lambda wildcards: take_of(wildcards).first,
+        model=detector_path,
+        csv=lambda wildcards: landmark_csv(wildcards, "{camera}"),
+    script:
+        "../scripts/landmarks_views.py"
