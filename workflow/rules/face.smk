@@ -9,13 +9,13 @@ rule face_archive:
         f"{R}/logs/face_archive.log",
     benchmark:
         f"{R}/benchmarks/face_archive.tsv"
-    params:
-        cfg=cfg_of("face_model", "url", "sha256"),
-        code=code_of("face_archive"),
+    localrule: True
     resources:
         mem_mb=500,
         runtime=60,
-    localrule: True
+    params:
+        cfg=cfg_of("face_model.url", "face_model.sha256"),
+        code=code_of("face_archive"),
     script:
         "../scripts/face_archive.py"
 
@@ -40,11 +40,11 @@ rule face_model:
         f"{R}/logs/face_model.log",
     benchmark:
         f"{R}/benchmarks/face_model.tsv"
-    params:
-        cfg=cfg_of("face_model"),
-        code=code_of("face_model"),
     resources:
         mem_mb=3000,
         runtime=20,
+    params:
+        cfg=cfg_of("face_model"),
+        code=code_of("face_model"),
     script:
         "../scripts/face_model.py"

@@ -6,4 +6,4 @@ from vermilion.logfile import log_to
 if __name__ == "__main__":
     log_to(snakemake.log[0])
     cfg = snakemake.params.cfg
-    download_archive(cfg["url"], cfg["sha256"], snakemake.output[0])
+    download_archive(cfg["face_model.url"], cfg["face_model.sha256"], snakemake.output[0])

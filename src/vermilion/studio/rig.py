@@ -32,8 +32,8 @@ STEREO_PAIRS = (
     ("lip0", "lip1"),
     ("lip2", "lip3"),
 )
-#: Camera whose pictures carry the labels.
-FRONTAL_CAMERA = "face2"
+#: The pair that looks from in front; the first carries the contour labels.
+FRONTAL_PAIR = ("face2", "face3")
 
 
 def camera_names(role: str) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,7 +23,7 @@ from vermilion.studio.performance import (
 from vermilion.studio.render import Stage
 from vermilion.studio.surface import Surface
 
-#: Shapes, not expressions: eyeballs turn little, so that a gaze never leaves the lids.
+#: Largest turn of the heads of a `people` take: sideways, nodding, tilting (degrees).
 FREE_TURN_DEG = (24.0, 11.0, 7.0)
 
 
@@ -147,16 +147,59 @@ def plan_people(model: FaceModel, n_frames: int, seed: int, spread: float) -> St
     )
 
 
-def untattooed(plan: StudioTakePlan) -> StudioTakePlan:
-    """The same take without paint on the lips."""
-    return replace(plan, tattoo=False)
+def plan_of(
+    model: FaceModel,
+    *,
+    role: str,
+    first: int,
+    last: int,
+    fps: float,
+    actor: dict,
+    performance: dict,
+    identity_spread: float,
+    seed: int,
+    slight_open: float,
+    ease_in_frames: int,
+    intensity: float,
+    head_turn_deg: float,
+    head_shift_mm: float,
+) -> StudioTakePlan:
+    """Plan a take of the take sheet from plain values.
+
+    Args:
+        actor: `seed` and `identity` of the subject.
+        performance: `performance`, `seed`, `csv`, `csv_first`, `csv_fps`, `lights` of the take.
+    """
+    n_frames = last - first + 1
+    actor_seed = int(np.random.default_rng([seed, actor["seed"]]).integers(2**31))
+    if performance["performance"] == "people":
+        return plan_people(model, n_frames, actor_seed + performance["seed"], identity_spread)
+    return plan_take(
+        model,
+        role=role,
+        n_frames=n_frames,
+        fps=fps,
+        subject_seed=actor_seed,
+        take_seed=performance["seed"],
+        identity=identity_of(model, actor["identity"], actor_seed, identity_spread),
+        performance=performance["performance"],
+        csv=performance["csv"],
+        csv_first=performance["csv_first"],
+        csv_fps=performance["csv_fps"],
+        lights=performance["lights"],
+        slight_open=slight_open,
+        ease_in_frames=ease_in_frames,
+        intensity=intensity,
+        head_turn_deg=head_turn_deg,
+        head_shift_mm=head_shift_mm,
+    )
 
 
 def cameras_of(
     plan: StudioTakePlan,
     role: str,
     *,
-    distance_mm: float,
+    camera_distance_mm: float,
     face_size_px: tuple[int, int],
     lip_size_px: tuple[int, int],
     video_size_px: tuple[int, int],
@@ -165,15 +208,16 @@ def cameras_of(
     video_view_mm: float,
 ) -> dict[str, Camera]:
     """The rig of a multi-view take, or the camera of a video, aimed at the actor's neutral."""
-    neutral = plan.neutral_mm()
+    one_person = (plan.identities == plan.identities[0]).all()
+    neutral = plan.neutral_mm() if one_person else plan.model.neutral_mm
     if role in ("tattoo", "plain"):
         return rig.lips16_rig(
             plan.model,
             neutral,
-            distance_mm,
+            camera_distance_mm,
             face_size_px,
             lip_size_px,
             face_view_mm,
             lip_view_mm,
         )
-    return rig.video_camera(plan.model, neutral, distance_mm, video_size_px, video_view_mm)
+    return rig.video_camera(plan.model, neutral, camera_distance_mm, video_size_px, video_view_mm)

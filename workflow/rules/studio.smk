@@ -1,0 +1,182 @@
+"""Synthetic captures (embedded default): capture folders as a real rig gives, their truth apart.
+
+A chunk's pictures are named one by one, so that a lost or damaged one is made again. As Snakemake
+wants to know the names of outputs beforehand, there is one rule a take and chunk, and `take` and
+`chunk` are read here, not from wildcards.
+"""
+
+from vermilion.config.studio import StudioSubject, StudioTake
+from vermilion.studio.labels import label_frames
+from vermilion.studio.rig import FRONTAL_PAIR, camera_names
+
+STUDIO_PLAN_KEYS = (
+    "identity_spread",
+    "seed",
+    "slight_open",
+    "ease_in_frames",
+    "intensity",
+    "head_turn_deg",
+    "head_shift_mm",
+)
+STUDIO_CAMERA_KEYS = (
+    "camera_distance_mm",
+    "face_size_px",
+    "lip_size_px",
+    "video_size_px",
+    "face_view_mm",
+    "lip_view_mm",
+    "video_view_mm",
+)
+STUDIO_PICTURE_KEYS = (
+    "occlusion_directions",
+    "light_samples",
+    "edge_samples",
+    "noise_read",
+    "noise_shot",
+)
+
+
+def studio_values(keys):
+    """Values of these keys of the studio's section."""
+    return {key: plain_value(f"studio.{key}") for key in keys}
+
+
+def studio_performance(take):
+    """How the take is performed: its section of the configuration, or the defaults."""
+    subject = CONFIG.studio.subjects.get(take.subject, StudioSubject())
+    return subject.takes.get(take.take, StudioTake())
+
+
+def studio_plan(take):
+    """All that the actor, the curves and the light of a take depend on."""
+    subject = CONFIG.studio.subjects.get(take.subject, StudioSubject())
+    return {
+        "role": take.role,
+        "first": take.first,
+        "last": take.last,
+        "fps": take.fps,
+        "actor": {"seed": subject.seed, "identity": subject.identity},
+        "performance": studio_performance(take).model_dump(mode="json"),
+        **studio_values(STUDIO_PLAN_KEYS),
+    }
+
+
+def studio_csv(take):
+    """The recorded curves of a `live_link` take."""
+    performance = studio_performance(take)
+    return [performance.csv] if performance.performance == "live_link" else []
+
+
+def studio_contour_labels(take):
+    """[camera, frame] of the contours that a person would draw."""
+    if take.role == "plain" or studio_performance(take).performance == "people":
+        return []
+    camera = FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role)[0]
+    frames = label_frames(take.first, take.last, CONFIG.studio.contour_labels)
+    return [[camera, frame] for frame in frames]
+
+
+def studio_landmark_labels(take):
+    """[camera, frame] of the landmarks that a person would mark: the neutral, seen by the frontal
+    pair; every frame of a `people` take."""
+    cameras = FRONTAL_PAIR if take.is_multiview else camera_names(take.role)
+    people = studio_performance(take).performance == "people"
+    frames = take.frames if people else [take.first]
+    return [[camera, frame] for camera in cameras for frame in frames]
+
+
+def studio_label_files(take):
+    """Label files of a take, in the order of the two lists above."""
+    labels = f"{R}/captures/{take.name}/labels"
+    return [
+        f"{labels}/{kind}/{camera}/{frame:06d}.json"
+        for kind, pairs in (
+            ("contours", studio_contour_labels(take)),
+            ("landmarks", studio_landmark_labels(take)),
+        )
+        for camera, frame in pairs
+    ]
+
+
+def studio_cameras(subject, take):
+    """Camera files of a studio take."""
+    folder = f"{R}/captures/{subject}/{take}/cameras"
+    return [f"{folder}/{name}.txt" for name in ("cameras", "images", "points3D")]
+
+
+def studio_frames(subject, take, chunk):
+    """Pictures of a chunk of a studio take."""
+    role = _TAKES[f"{subject}/{take}"].role
+    return [
+        f"{R}/captures/{subject}/{take}/frames/{camera}/{frame:06d}.png"
+        for camera in camera_names(role)
+        for frame in frames_in(chunk)
+    ]
+
+
+for take in [take for take in TAKES if take.source == STUDIO]:
+
+    rule:
+        # The cameras, labels and truth of one take.
+        name:
+            f"studio_rig_{take.subject}_{take.take}"
+        input:
+            model=f"{R}/face/studio.npz",
+            csv=studio_csv(take),
+        output:
+            cameras=studio_cameras(take.subject, take.take),
+            labels=studio_label_files(take),
+            truth=multiext(
+                f"{R}/truth/{take.name}/",
+                "vertices_mm.npy",
+                "triangles.npy",
+                "neutral_mm.npy",
+                "weights.json",
+            ),
+        log:
+            f"{R}/logs/studio/{take.subject}-{take.take}-rig.log",
+        benchmark:
+            f"{R}/benchmarks/studio/{take.subject}-{take.take}-rig.tsv"
+        resources:
+            mem_mb=1500 + len(take.frames),
+            runtime=30,
+        params:
+            cfg={
+                "plan": studio_plan(take),
+                "cameras": studio_values(STUDIO_CAMERA_KEYS),
+                "contours": studio_contour_labels(take),
+                "landmarks": studio_landmark_labels(take),
+            },
+            code=code_of("studio_rig"),
+        script:
+            "../scripts/studio_rig.py"
+
+    for chunk in chunks(take.subject, take.take):
+
+        rule:
+            # The pictures of one chunk of a take, from all cameras.
+            name:
+                f"studio_take_{take.subject}_{take.take}_{chunk.replace('-', '_')}"
+            input:
+                model=f"{R}/face/studio.npz",
+                csv=studio_csv(take),
+                cameras=studio_cameras(take.subject, take.take),
+            output:
+                studio_frames(take.subject, take.take, chunk),
+            log:
+                f"{R}/logs/studio/{take.subject}-{take.take}-{chunk}.log",
+            benchmark:
+                f"{R}/benchmarks/studio/{take.subject}-{take.take}-{chunk}.tsv"
+            resources:
+                mem_mb=1500,
+                runtime=5 + len(frames_in(chunk)),
+            params:
+                cfg={
+                    "plan": studio_plan(take),
+                    "pictures": studio_values(STUDIO_PICTURE_KEYS),
+                    "name": take.name,
+                    "frames": frames_in(chunk),
+                },
+                code=code_of("studio_take"),
+            script:
+                "../scripts/studio_take.py"
