@@ -1,0 +1,220 @@
+"""Configuration of the multi-view reconstruction (Lips16 3.1)."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from vermilion.config.base import StageConfig
+
+
+class ImageConfig(StageConfig):
+    """How pictures are prepared for matching."""
+
+    window_px: float = Field(
+        8.0,
+        gt=0.5,
+        le=50,
+        description="Standard deviation of the window of the local contrast normalisation (px).",
+    )
+    floor: float = Field(
+        0.01,
+        gt=0,
+        le=0.5,
+        description="Local deviation of sRGB luma (0 to 1) below which a picture counts as flat.",
+    )
+
+
+class StereoConfig(StageConfig):
+    """Dense matching of rectified stereo pairs."""
+
+    pairs: list[tuple[str, str]] = Field(
+        [],
+        description="Stereo pairs by camera name; empty: found from the cameras' poses (nearest "
+        "viewing direction, similar resolution).",
+    )
+    reach_mm: float = Field(
+        70.0, gt=5, le=500, description="Depth of the face round its landmarks' centre (mm)."
+    )
+    block_px: int = Field(
+        5, ge=1, le=21, description="Matching window of semi-global matching (px)."
+    )
+    uniqueness_percent: int = Field(
+        5, ge=0, le=50, description="Margin by which the best disparity must win (percent)."
+    )
+    consistency_px: float = Field(
+        1.0, gt=0, le=5, description="Largest left-right disagreement of a disparity (px)."
+    )
+    speckle_px: int = Field(
+        200, ge=0, le=100_000, description="Smaller connected regions are dropped (px)."
+    )
+    min_texture: float = Field(
+        4.0,
+        ge=0,
+        le=100,
+        description="Smallest local deviation of the normalised picture (grey levels of 255).",
+    )
+    spacing_mm: float = Field(
+        1.0, gt=0.1, le=5, description="Spacing of the fused point cloud (mm)."
+    )
+
+
+class NeutralConfig(StageConfig):
+    """Registration of the template to the neutral frame."""
+
+    min_confidence: float = Field(
+        0.3, ge=0, le=1, description="Landmarks of a view below this confidence are left out."
+    )
+    landmark_distance_mm: float = Field(
+        4.0,
+        gt=0.1,
+        le=50,
+        description="A view agrees with a triangulated landmark within this distance (mm).",
+    )
+    landmark_sigma_mm: float = Field(
+        2.0, gt=0.1, le=20, description="Expected error of a triangulated landmark (mm)."
+    )
+    landmark_length_mm: float = Field(
+        15.0,
+        gt=1,
+        le=100,
+        description="Stiffness of the deformation onto the landmarks: details below it stay (mm).",
+    )
+    first_gate_mm: float = Field(
+        20.0, gt=1, le=100, description="Largest distance of a matched point, first round (mm)."
+    )
+    last_gate_mm: float = Field(
+        3.0, gt=0.2, le=20, description="Largest distance of a matched point, last round (mm)."
+    )
+    first_length_mm: float = Field(
+        40.0, gt=1, le=200, description="Stiffness of the first round of dense registration (mm)."
+    )
+    last_length_mm: float = Field(
+        4.0, gt=0.5, le=50, description="Stiffness of the last round of dense registration (mm)."
+    )
+    rounds: int = Field(9, ge=2, le=50, description="Rounds of dense registration.")
+    poisson_depth: int = Field(
+        8, ge=5, le=12, description="Octree depth of the screened Poisson reconstruction."
+    )
+    polish_lengths_mm: list[float] = Field(
+        [4.0, 3.0, 2.5],
+        description="Stiffness of each round of photo-consistency between cameras (mm).",
+    )
+    polish_min_angle_deg: float = Field(
+        6.0,
+        gt=0,
+        le=60,
+        description="Pairs of cameras below this angle are not polished (degrees).",
+    )
+    polish_max_angle_deg: float = Field(
+        40.0,
+        gt=0,
+        le=90,
+        description="Pairs of cameras above this angle are not polished (degrees).",
+    )
+
+
+class TrackConfig(StageConfig):
+    """The coarse track through the take, between anchor frames."""
+
+    scale: float = Field(
+        0.5, gt=0.05, le=1.0, description="Size of the pictures against the originals (ratio)."
+    )
+    length_mm: float = Field(
+        6.0, gt=0.5, le=50, description="Stiffness: motion is smooth below this length (mm)."
+    )
+    sigma_px: float = Field(
+        0.5,
+        gt=0.01,
+        le=10,
+        description="Expected error of a flow vector (px of the small pictures).",
+    )
+    min_agreement: float = Field(
+        0.4, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
+    )
+    max_step_mm: float = Field(
+        8.0, gt=0.1, le=100, description="Longest motion of a vertex between two frames (mm)."
+    )
+    anchor_similarity: float = Field(
+        0.8,
+        ge=0,
+        le=1,
+        description="Smallest correlation of an anchor frame's pictures with the neutral's.",
+    )
+    anchor_spacing: int = Field(
+        10, ge=1, le=10_000, description="Smallest distance of two anchor frames (frames)."
+    )
+
+
+class RefineConfig(StageConfig):
+    """The final registration of each frame to the neutral's pictures."""
+
+    scales: list[float] = Field(
+        [0.5, 1.0],
+        min_length=1,
+        description="Size of the pictures in each round against the originals (ratio).",
+    )
+    lengths_mm: list[float] = Field(
+        [4.0, 1.5],
+        min_length=1,
+        description="Stiffness of each round: details below it come from the neutral (mm).",
+    )
+    sigma_px: float = Field(
+        0.3, gt=0.01, le=10, description="Expected error of a flow vector (px)."
+    )
+    min_agreement: float = Field(
+        0.4, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
+    )
+    max_step_mm: float = Field(
+        8.0, gt=0.1, le=100, description="Longest motion of a vertex in a round (mm)."
+    )
+    ray_stride_px: int = Field(
+        2, ge=1, le=8, description="Distance of the rays that predict a picture (px)."
+    )
+    cloud_scale: float = Field(
+        0.5,
+        ge=0,
+        le=1.0,
+        description="Size of the pictures for each frame's stereo points against the originals "
+        "(ratio); 0: no stereo after the neutral.",
+    )
+    cloud_gate_mm: float = Field(
+        1.5, gt=0.05, le=20, description="Largest distance of a stereo point from the mesh (mm)."
+    )
+    max_residual_px: float = Field(
+        2.0,
+        gt=0.05,
+        le=50,
+        description="Median residual at which a frame is flagged as failed (px).",
+    )
+    min_seen_percent: float = Field(
+        25.0,
+        ge=0,
+        le=100,
+        description="Share of the neutral's visible vertices that must be measured, below which a "
+        "frame is flagged as failed (percent).",
+    )
+
+
+class MultiviewConfig(StageConfig):
+    """From calibrated cameras to **H**, the registered high-quality mesh sequence."""
+
+    images: ImageConfig = Field(default_factory=ImageConfig, description="Preparation of pictures.")
+    stereo: StereoConfig = Field(default_factory=StereoConfig, description="Dense matching.")
+    neutral: NeutralConfig = Field(
+        default_factory=NeutralConfig, description="Template to the neutral frame."
+    )
+    track: TrackConfig = Field(
+        default_factory=TrackConfig, description="Coarse track with anchor frames (Beeler 2011)."
+    )
+    refine: RefineConfig = Field(
+        default_factory=RefineConfig, description="Registration of each frame to the neutral."
+    )
+
+    @model_validator(mode="after")
+    def _rounds_agree(self) -> MultiviewConfig:
+        if len(self.refine.scales) != len(self.refine.lengths_mm):
+            raise ValueError(
+                f"multiview.refine.scales has {len(self.refine.scales)} rounds, "
+                f"multiview.refine.lengths_mm has {len(self.refine.lengths_mm)}; give as many"
+            )
+        return self

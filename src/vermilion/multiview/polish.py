@@ -1,0 +1,117 @@
+"""Photo-consistency between cameras: the surface of one frame to a small part of a pixel.
+
+The mesh predicts one camera's picture from another's; the flow to the real picture, taken along
+the ray of the first camera, says how far the surface lies in front of or behind the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vermilion.mesh import vertex_normals
+from vermilion.multiview.photometric import FlowMatcher, measure_motion, sight
+from vermilion.multiview.solver import ThinPlate, solve_displacement
+from vermilion.multiview.views import Frame, pixel_jacobian
+from vermilion.raycast import RayCaster
+
+
+def normal_offsets(
+    frame: Frame,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    pairs: Sequence[tuple[str, str]],
+    matcher: FlowMatcher,
+    *,
+    sigma_px: float,
+    max_offset_mm: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of the real surface from each vertex along its normal, from all pairs.
+
+    Returns:
+        (offset (V,) mm, information (V,) 1/mm^2, zero where no pair sees the vertex).
+    """
+    caster = RayCaster(vertices_mm, triangles)
+    normals = vertex_normals(vertices_mm, triangles)
+    sights = {
+        name: sight(caster, view.camera, vertices_mm, normals) for name, view in frame.views.items()
+    }
+    offsets, weights = [], []
+    for a, b in pairs:
+        for source, target in ((a, b), (b, a)):
+            motion = measure_motion(
+                matcher,
+                caster,
+                sights[target],
+                frame.views[target],
+                frame.views[source],
+                sights[source],
+            )
+            origin = frame.views[source].camera.centre_mm
+            ray = vertices_mm - origin
+            ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+            slope = np.einsum(
+                "vij,vj->vi", pixel_jacobian(frame.views[target].camera, vertices_mm), ray
+            )
+            square = np.maximum((slope * slope).sum(axis=1), 1e-9)
+            along = (slope * motion.offset_px).sum(axis=1) / square
+            across = motion.offset_px - along[:, None] * slope
+            off_line = np.linalg.norm(across, axis=1)
+            cosine = (ray * normals).sum(axis=1)
+            offset = along * cosine
+            weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
+            weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
+            weight[np.abs(offset) > max_offset_mm] = 0
+            offsets.append(offset)
+            weights.append(weight)
+    return robust_mean(np.array(offsets), np.array(weights))
+
+
+def robust_mean(values: np.ndarray, weights: np.ndarray, rounds: int = 5):
+    """Weighted mean over the first axis with Cauchy weights, (mean (V,), information (V,))."""
+    total = weights.sum(axis=0)
+    w = weights
+    for _ in range(rounds):
+        mean = (w * values).sum(axis=0) / np.maximum(w.sum(axis=0), 1e-12)
+        away = (values - mean) ** 2 * weights
+        w = weights / (1 + away / 4.0)
+    return mean, np.where(total > 0, w.sum(axis=0), 0.0)
+
+
+def polish(
+    frame: Frame,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    pairs: Sequence[tuple[str, str]],
+    matcher: FlowMatcher,
+    *,
+    lengths_mm: Sequence[float],
+    sigma_px: float,
+    max_offset_mm: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Move the mesh onto the photo-consistent surface, one round a stiffness.
+
+    Returns:
+        (vertices (V, 3) mm, information (V,) of the last round).
+    """
+    current = vertices_mm
+    information = np.zeros(len(vertices_mm))
+    for length in lengths_mm:
+        offset, information = normal_offsets(
+            frame,
+            current,
+            triangles,
+            pairs,
+            matcher,
+            sigma_px=sigma_px,
+            max_offset_mm=max_offset_mm,
+        )
+        plate = ThinPlate.of(current, triangles)
+        normals = vertex_normals(current, triangles)
+        weight = np.minimum(information / max(np.median(information[information > 0]), 1e-9), 10)
+        blocks = weight[:, None, None] * (normals[:, :, None] * normals[:, None, :])
+        blocks = blocks + (1e-3 * np.minimum(weight, 1))[:, None, None] * np.eye(3)
+        right = (weight * offset)[:, None] * normals
+        current = current + solve_displacement(plate, blocks, right, length)
+    return current, information

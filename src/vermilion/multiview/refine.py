@@ -1,0 +1,132 @@
+"""One frame registered directly to the reference frame's pictures: no drift, any order.
+
+Each camera's picture is predicted by carrying the reference picture of the same camera through the
+mesh; the flow to the real picture gives every visible vertex a displacement in every camera that
+sees it; a robust solve brings them together with the shape prior and the frame's stereo points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.mesh import vertex_normals
+from vermilion.multiview.motion import Measurements, Reference, cloud_planes, solve_motion
+from vermilion.multiview.photometric import FlowMatcher, measure_motion, sight
+from vermilion.multiview.stereo import Cloud
+from vermilion.multiview.views import Frame, pixel_jacobian
+from vermilion.raycast import RayCaster
+
+
+@dataclass(frozen=True)
+class Registered:
+    """A frame's mesh and how well it is known.
+
+    Attributes:
+        vertices_mm: (V, 3).
+        cameras_seeing: (V,) uint8, cameras with a usable measurement of the vertex; zero where
+            the position comes from the shape prior alone.
+        residual_px: (V,) weighted root mean square of what is left, NaN where not measured.
+    """
+
+    vertices_mm: np.ndarray
+    cameras_seeing: np.ndarray
+    residual_px: np.ndarray
+
+
+def register_frame(
+    levels: Sequence[tuple[Reference, Frame, float]],
+    start_mm: np.ndarray,
+    matcher: FlowMatcher,
+    *,
+    sigma_px: float,
+    max_step_mm: float,
+    min_agreement: float,
+    stride_px: int = 2,
+    cloud: Cloud | None = None,
+    cloud_allowed: np.ndarray | None = None,
+    cloud_gate_mm: float = 1.5,
+) -> Registered:
+    """Register a frame from a start within some pixels.
+
+    Args:
+        levels: the rounds: reference and frame at that round's resolution, and its stiffness in
+            mm (see `solver`).
+        start_mm: (V, 3).
+        sigma_px: expected error of a measurement.
+        max_step_mm: longest step of a vertex in a round.
+        min_agreement: correlation below which a measurement is not used.
+        stride_px: distance of the rays that predict a picture.
+        cloud, cloud_allowed, cloud_gate_mm: the frame's stereo points and which vertices (V,)
+            they may pull.
+    """
+    current = np.asarray(start_mm, dtype=np.float64)
+    for reference, frame, length in levels:
+        measured, normals = measure_frame(
+            reference, frame, current, matcher, min_agreement, stride_px
+        )
+        planes = None
+        if cloud is not None:
+            planes = cloud_planes(
+                current,
+                normals,
+                cloud,
+                cloud_allowed,
+                sigma_mm=sigma_px / reference.px_per_mm,
+                gate_mm=cloud_gate_mm,
+            )
+        solution = solve_motion(
+            reference.plate,
+            current,
+            measured,
+            length,
+            px_per_mm=levels[-1][0].px_per_mm,
+            sigma_px=sigma_px,
+            max_step_mm=max_step_mm,
+            planes=planes,
+        )
+        current = current + solution.step_mm
+    total = solution.weights.sum(axis=0)
+    square = (solution.weights * solution.left_px**2).sum(axis=0)
+    residual = np.where(total > 0, np.sqrt(square / np.maximum(total, 1e-9)), np.nan)
+    seeing = (solution.weights > 0.05).sum(axis=0).astype(np.uint8)
+    return Registered(current, seeing, residual)
+
+
+def measure_frame(
+    reference: Reference,
+    frame: Frame,
+    vertices_mm: np.ndarray,
+    matcher: FlowMatcher,
+    min_agreement: float,
+    stride_px: int,
+) -> tuple[Measurements, np.ndarray]:
+    """What all cameras of a frame, that the reference has too, say of a mesh; and its normals."""
+    caster = RayCaster(vertices_mm, reference.triangles)
+    normals = vertex_normals(vertices_mm, reference.triangles)
+    jacobians, motions = [], []
+    for name, view in frame.views.items():
+        if name not in reference.sights:
+            continue
+        seen = sight(caster, view.camera, vertices_mm, normals)
+        motions.append(
+            measure_motion(
+                matcher,
+                caster,
+                seen,
+                view,
+                reference.frame.views[name],
+                reference.sights[name],
+                stride_px=stride_px,
+                min_agreement=min_agreement,
+            )
+        )
+        jacobians.append(pixel_jacobian(view.camera, vertices_mm))
+    measured = Measurements(
+        np.array(jacobians),
+        np.array([m.offset_px for m in motions]),
+        np.array([m.weight for m in motions]),
+    )
+    return measured, normals

@@ -1,0 +1,152 @@
+"""Dense matching of rectified pairs, to points in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vermilion.mesh import normalised
+from vermilion.multiview.pairs import Rectified, rectified_picture, rectify
+from vermilion.multiview.views import View
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """An oriented point cloud.
+
+    Attributes:
+        points_mm: (N, 3).
+        normals: (N, 3) unit, towards the cameras.
+        sigma_mm: (N,) expected error along the viewing ray.
+    """
+
+    points_mm: np.ndarray
+    normals: np.ndarray
+    sigma_mm: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.points_mm)
+
+    def select(self, keep: np.ndarray) -> Cloud:
+        return Cloud(self.points_mm[keep], self.normals[keep], self.sigma_mm[keep])
+
+    @classmethod
+    def join(cls, clouds: list[Cloud]) -> Cloud:
+        if not clouds:
+            return cls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+        return cls(
+            np.concatenate([c.points_mm for c in clouds]),
+            np.concatenate([c.normals for c in clouds]),
+            np.concatenate([c.sigma_mm for c in clouds]),
+        )
+
+
+def match_pair(
+    a: View,
+    b: View,
+    target_mm: np.ndarray,
+    reach_mm: float,
+    *,
+    block_px: int,
+    uniqueness_percent: int,
+    consistency_px: float,
+    speckle_px: int,
+    min_texture: float,
+    masks: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+) -> Cloud:
+    """Match two views by semi-global matching (Hirschmueller 2008) and triangulate.
+
+    Args:
+        target_mm, reach_mm: the scene lies within `reach_mm` of the point.
+        consistency_px: largest left-right disagreement of a disparity.
+        speckle_px: connected regions of fewer pixels are dropped.
+        min_texture: smallest local deviation of the normalised picture (of 255).
+        masks: pixels (h, w) bool of the two views that may be matched; None for all.
+    """
+    pair = rectify(a.camera, b.camera, target_mm, reach_mm)
+    left, left_inside = _turned(a, pair.left, masks[0])
+    right, right_inside = _turned(b, pair.right, masks[1])
+    disparity = _disparity(left, right, pair, block_px, uniqueness_percent)
+    # the same matcher, right to left, on mirrored pictures
+    mirrored = _disparity(right[:, ::-1], left[:, ::-1], pair, block_px, uniqueness_percent)
+    back = mirrored[:, ::-1]
+    height, width = disparity.shape
+    columns = np.arange(width)[None, :]
+    there = np.rint(columns - np.nan_to_num(disparity)).astype(int)
+    inside = (there >= 0) & (there < width)
+    there = np.clip(there, 0, width - 1)
+    rows = np.arange(height)[:, None]
+    agrees = np.abs(back[rows, there] - disparity) <= consistency_px
+    good = agrees & inside & left_inside & right_inside[rows, there]
+    good &= _texture(left, block_px) >= min_texture
+    kept = np.where(good, disparity, np.float32(pair.min_disparity_px - 1))
+    fixed = np.ascontiguousarray(np.rint(kept * 16).astype(np.int16))
+    hole = int((pair.min_disparity_px - 1) * 16)
+    cv2.filterSpeckles(fixed, hole, speckle_px, 16)
+    good = fixed != hole
+    smooth = _smoothed(disparity, good)
+    return _to_cloud(pair, smooth, good)
+
+
+def _turned(view: View, camera, mask):
+    picture, inside = rectified_picture(view.camera, view.normalised, camera)
+    if mask is not None:
+        allowed, _ = rectified_picture(view.camera, mask.astype(np.uint8) * 255, camera)
+        inside = inside & (allowed > 127)
+    return picture, inside
+
+
+def _disparity(left, right, pair: Rectified, block_px: int, uniqueness_percent: int):
+    """x_left - x_right (h, w) float32, NaN where unmatched. Pictures are padded by the range."""
+    pad = pair.n_disparities
+    border = [
+        cv2.copyMakeBorder(np.ascontiguousarray(p), 0, 0, pad, pad, cv2.BORDER_CONSTANT)
+        for p in (left, right)
+    ]
+    matcher = cv2.StereoSGBM_create(
+        minDisparity=pair.min_disparity_px,
+        numDisparities=pair.n_disparities,
+        blockSize=block_px,
+        P1=8 * block_px**2,
+        P2=32 * block_px**2,
+        disp12MaxDiff=-1,
+        preFilterCap=63,
+        uniquenessRatio=uniqueness_percent,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
+    fixed = matcher.compute(*border)[:, pad : pad + left.shape[1]]
+    disparity = fixed.astype(np.float32) / 16
+    return np.where(fixed >= pair.min_disparity_px * 16, disparity, np.nan)
+
+
+def _texture(picture, block_px):
+    value = picture.astype(np.float32)
+    mean = cv2.blur(value, (block_px, block_px))
+    square = cv2.blur(value * value, (block_px, block_px))
+    return np.sqrt(np.maximum(square - mean * mean, 0))
+
+
+def _smoothed(disparity, good, sigma_px: float = 1.2):
+    """Mean over matched neighbours: takes out the steps of the sixteenths."""
+    weight = cv2.GaussianBlur(good.astype(np.float32), (0, 0), sigma_px)
+    value = cv2.GaussianBlur(np.where(good, disparity, 0).astype(np.float32), (0, 0), sigma_px)
+    return np.where(good, value / np.maximum(weight, 1e-6), np.nan)
+
+
+def _to_cloud(pair: Rectified, disparity, good) -> Cloud:
+    rows, columns = np.nonzero(good)
+    pixels = np.stack([columns + 0.5, rows + 0.5], axis=1)
+    points = np.full((*disparity.shape, 3), np.nan)
+    points[rows, columns] = pair.points(pixels, disparity[rows, columns].astype(np.float64))
+    across = points[:, 2:] - points[:, :-2]
+    down = points[2:] - points[:-2]
+    normals = np.full_like(points, np.nan)
+    normals[1:-1, 1:-1] = normalised(np.cross(down[:, 1:-1], across[1:-1]))
+    depth = pair.left.to_camera(points[rows, columns])[:, 2]
+    focal = pair.left.calibration[0, 0]
+    sigma = 0.25 * depth**2 / (focal * pair.baseline_mm)
+    keep = np.isfinite(normals[rows, columns]).all(axis=1)
+    cloud = Cloud(points[rows, columns], normals[rows, columns], sigma)
+    return cloud.select(keep)

@@ -1,0 +1,171 @@
+"""The pictures of one frame as the stage uses them: undistorted, grey, locally normalised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.errors import InputError
+from vermilion.frames import FrameSource
+from vermilion.images import linear_to_srgb
+
+LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera's picture of one frame.
+
+    Attributes:
+        camera: a pinhole camera; distortion has been taken out of the picture.
+        grey: (h, w) float32 sRGB luma in [0, 1].
+        normalised: (h, w) uint8, local mean 128 and local deviation 40 where there is texture.
+    """
+
+    camera: Camera
+    grey: np.ndarray
+    normalised: np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """All views of one frame, and what could not be read.
+
+    Attributes:
+        number: frame number.
+        views: camera name -> View, sorted by name.
+        missing: camera name -> reason.
+    """
+
+    number: int
+    views: dict[str, View]
+    missing: dict[str, str]
+
+
+def make_view(
+    camera: Camera, linear_rgb: np.ndarray, window_px: float, floor: float, scale: float = 1.0
+) -> View:
+    """Undistort, take the luma, normalise locally.
+
+    Args:
+        camera: of the picture; any COLMAP model.
+        linear_rgb: (h, w, 3) float32.
+        window_px: standard deviation of the Gaussian window of the local mean and deviation.
+        floor: deviation (of luma in [0, 1]) that is added so that flat areas stay flat.
+        scale: size of the view against the picture; `window_px` is of the view.
+    """
+    grey = linear_to_srgb(linear_rgb @ LUMA)
+    if not camera.is_pinhole:
+        camera, grey = undistorted(camera, grey)
+    view = View(camera, grey, normalise(grey, window_px, floor) if scale == 1.0 else grey)
+    return view if scale == 1.0 else _shrunk(view, scale, window_px, floor)
+
+
+def shrunk(frame: Frame, scale: float, window_px: float, floor: float) -> Frame:
+    """The frame with all pictures resized by `scale` below one; `window_px` of the small ones."""
+    views = {name: _shrunk(v, scale, window_px, floor) for name, v in frame.views.items()}
+    return Frame(frame.number, views, frame.missing)
+
+
+def _shrunk(view: View, scale: float, window_px: float, floor: float) -> View:
+    camera = view.camera.resized(scale)
+    size = (camera.width_px, camera.height_px)
+    grey = cv2.resize(view.grey, size, interpolation=cv2.INTER_AREA)
+    return View(camera, grey, normalise(grey, window_px, floor))
+
+
+def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
+    """Local contrast normalisation of (h, w) in [0, 1] to uint8 round 128.
+
+    Two box filters have the spread of a Gaussian of `window_px`, at a cost that does not grow.
+    """
+    width = 2 * round((np.sqrt(6 * window_px**2 + 1) - 1) / 2) + 1
+    mean, square = (
+        cv2.blur(cv2.blur(values, (width, width)), (width, width)) for values in (grey, grey * grey)
+    )
+    deviation = np.sqrt(np.maximum(square - mean * mean, 0)) + floor
+    return np.clip(128 + 40 * (grey - mean) / deviation, 0, 255).astype(np.uint8)
+
+
+def undistorted(camera: Camera, image: np.ndarray) -> tuple[Camera, np.ndarray]:
+    """The pinhole camera with the same matrix and size, and its picture (borders repeated)."""
+    k = camera.calibration
+    params = (k[0, 0], k[1, 1], k[0, 2], k[1, 2])
+    straight = replace(camera, model="PINHOLE", params=tuple(float(p) for p in params))
+    origins, directions = straight.rays(straight.pixel_grid())
+    where = (camera.project(origins + 1000.0 * directions) - 0.5).astype(np.float32)
+    picture = cv2.remap(
+        image, where[..., 0], where[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return straight, picture
+
+
+def load_frame(
+    source: FrameSource,
+    cameras: Mapping[str, Camera],
+    number: int,
+    window_px: float,
+    floor: float,
+    scale: float = 1.0,
+) -> Frame:
+    """Read every camera of a frame; a camera without a readable picture is noted as missing.
+
+    Raises InputError where fewer than two cameras are left.
+    """
+    views, missing = {}, {}
+    for name, camera in sorted(cameras.items()):
+        try:
+            linear = source.read(name, number)
+        except InputError as error:
+            missing[name] = str(error)
+            continue
+        if linear.shape[:2] != (camera.height_px, camera.width_px):
+            missing[name] = (
+                f"picture of {linear.shape[1]} x {linear.shape[0]}, "
+                f"camera of {camera.width_px} x {camera.height_px}"
+            )
+            continue
+        views[name] = make_view(camera, linear, window_px, floor, scale)
+    if len(views) < 2:
+        reasons = "; ".join(missing.values())
+        raise InputError(
+            f"{len(views)} readable pictures ({reasons})",
+            "two or more cameras",
+            "Export the frame again or take it out of the take sheet.",
+            frame=number,
+        )
+    return Frame(number, views, missing)
+
+
+def pixel_jacobian(camera: Camera, points_mm: np.ndarray) -> np.ndarray:
+    """Change of the pixel by the world point, (N, 2, 3) px/mm; `camera` is a pinhole."""
+    k = camera.calibration
+    local = camera.to_camera(points_mm)
+    z = local[:, 2]
+    inner = np.zeros((len(points_mm), 2, 3))
+    inner[:, 0, 0] = k[0, 0] / z
+    inner[:, 1, 1] = k[1, 1] / z
+    inner[:, 0, 2] = -k[0, 0] * local[:, 0] / z**2
+    inner[:, 1, 2] = -k[1, 1] * local[:, 1] / z**2
+    return inner @ camera.rotation
+
+
+def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Bilinear values of (h, w) or (h, w, c) float32 at pixels (N, 2); borders repeated."""
+    where = np.nan_to_num(pixels - 0.5).astype(np.float32).reshape(1, -1, 2)
+    # cv2.remap takes maps of at most 32,767 columns
+    parts = [
+        cv2.remap(
+            image,
+            part[..., 0],
+            part[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )[0]
+        for part in np.array_split(where, -(-max(where.shape[1], 1) // 30000), axis=1)
+    ]
+    return np.concatenate(parts)
