@@ -32,7 +32,8 @@ def capture_inputs(wildcards):
     """Pictures of a chunk that exist, and the calibration; a missing picture is the job's to name."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        return studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
+        pictures = studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
+        return pictures + studio_cameras(wildcards.subject, wildcards.take)
     if Path(take.source).suffix.lower() in VIDEO_SUFFIXES:
         return [take.source]
     files = capture_files(take.source)

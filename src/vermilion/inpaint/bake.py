@@ -50,13 +50,13 @@ def view_weight(
     camera: Camera,
     points_mm: np.ndarray,
     normals: np.ndarray,
-    edge_px: float = 1.5,
+    edge_mm: float,
 ) -> np.ndarray:
     """How well a camera sees the valid texels, (n,) float32; 0 where hidden or doubtful.
 
     Pixels an area of a texel (foreshortened) times the cosine of the viewing angle. Texels closer
-    than `edge_px` to an occluding contour or to the mouth's inside count as hidden, because the
-    mesh is never exact to a pixel.
+    than `edge_mm` (and 1.5 pixels) to an occluding contour or to the mouth's inside count as hidden,
+    because the mesh is never exact and the lens mixes what lies behind into them.
     """
     towards = camera.centre_mm - points_mm
     distance = np.linalg.norm(towards, axis=1)
@@ -64,15 +64,14 @@ def view_weight(
     pixels = camera.project(points_mm)
     density = (camera.calibration[0, 0] / distance * domain.texel_mm) ** 2
     weight = np.where(caster.visible(camera, points_mm, 0.3), density * facing**2, 0.0)
-    if edge_px > 0 and weight.any():
-        clear = sample(_clearance(domain, caster, camera, points_mm), pixels)
-        weight = np.where(clear >= edge_px, weight, 0.0)
+    if weight.any():
+        clear_px = sample(_clearance(domain, caster, camera), pixels)
+        edge_px = np.maximum(edge_mm * camera.calibration[0, 0] / distance, 1.5)
+        weight = np.where(clear_px >= edge_px, weight, 0.0)
     return np.where(facing > 0.15, weight, 0.0).astype(np.float32)
 
 
-def _clearance(
-    domain: LipDomain, caster: RayCaster, camera: Camera, points_mm: np.ndarray
-) -> np.ndarray:
+def _clearance(domain: LipDomain, caster: RayCaster, camera: Camera) -> np.ndarray:
     """Pixels' distance to the nearest occluding contour or pixel without the domain, (h, w)."""
     hits = caster.see(camera)
     on_domain = hits.hit & domain.in_domain[np.maximum(hits.triangle, 0)]
@@ -90,7 +89,7 @@ def bake(
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
     views: Sequence[tuple[Camera, np.ndarray]],
-    match_gain: bool = True,
+    edge_mm: float = 0.8,
 ) -> Texture:
     """Blend the views' colours over the domain.
 
@@ -99,6 +98,7 @@ def bake(
         triangles: (T, 3).
         views: (camera, linear RGB (h, w, 3)); the first one sets the colour, the others are
             brought to it by one gain a channel where both see the skin.
+        edge_mm: surface closer than this to an occluding contour is not used.
     """
     caster = RayCaster(vertices_mm, triangles)
     points, normals = surface_points(domain, vertices_mm, triangles)
@@ -106,12 +106,12 @@ def bake(
     weights = np.zeros(len(points), dtype=np.float32)
     reference: tuple[np.ndarray, np.ndarray] | None = None
     for camera, linear in views:
-        weight = view_weight(domain, caster, camera, points, normals)
+        weight = view_weight(domain, caster, camera, points, normals, edge_mm)
         colour = sample(linear, camera.project(points))
-        if match_gain and reference is not None:
-            colour = colour * _gain(colour, weight, *reference)
-        elif reference is None:
+        if reference is None:
             reference = (colour, weight)
+        else:
+            colour = colour * _gain(colour, weight, *reference)
         # Squared, so that the best view dominates and small misalignments do not blur.
         total += colour * (weight**2)[:, None]
         weights += weight**2

@@ -60,19 +60,23 @@ def fill_holes(values: np.ndarray, known: np.ndarray, sigma: float = 1.5) -> np.
     """Values (h, w[, c]) continued smoothly from where they are `known` (h, w) to everywhere.
 
     Each round widens the Gaussian twofold and fills what it reaches, so that near holes are filled
-    from near by.
+    from near by; a few rounds of averaging remove the steps between the rounds.
     """
     if not known.any():
         return np.zeros_like(values, dtype=np.float32)
     filled = np.where(known[(...,) + (None,) * (np.ndim(values) - 2)], values, 0)
     filled = filled.astype(np.float32)
     missing = ~known
+    width = sigma
     while missing.any():
-        means, support = weighted_blur(values, known.astype(np.float32), sigma)
+        means, support = weighted_blur(values, known.astype(np.float32), width)
         reached = missing & (support > 1e-3)
         filled[reached] = means[reached]
         missing &= ~reached
-        sigma *= 2.0
+        width *= 2.0
+    everywhere = np.ones(known.shape, dtype=np.float32)
+    for width in (4 * sigma, 2 * sigma, 2 * sigma, sigma):
+        filled[~known] = weighted_blur(filled, everywhere, width)[0][~known]
     return filled
 
 

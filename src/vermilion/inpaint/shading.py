@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from vermilion.inpaint.bake import Texture
 from vermilion.inpaint.domain import LipDomain
-from vermilion.inpaint.fields import fill_holes, luminance, weighted_blur
+from vermilion.inpaint.fields import blur, fill_holes, luminance, weighted_blur
 
 _SUPPORT = 0.05  # of a Gaussian's mass; less does not carry a mean
 
@@ -27,12 +28,14 @@ class Shading:
         mode: `ratio` (log intensity), `difference` (intensity, as the paper writes) or `none`.
         sigma_mm: low-pass of the change between a frame and the reference.
         border_mm: low-pass of the match to the skin round the painted region.
+        gap_mm: skin closer than this to the painted region is not trusted to be bare.
         limit: largest gain, and its inverse the smallest.
     """
 
     mode: str = "ratio"
     sigma_mm: float = 2.0
     border_mm: float = 2.0
+    gap_mm: float = 1.0
     limit: float = 2.5
 
 
@@ -53,16 +56,22 @@ def equalised(
         opacity: (h, w) where it will be painted; 0 is bare skin, which calibrates the colours.
     """
     base = fill_holes(plain.rgb, plain.seen)
-    bare = (opacity <= 0) & domain.valid & ~domain.inner
+    bare = bare_skin(domain, opacity, shading.gap_mm) & plain.seen
     # 1. The plain take against the reference pose, known on the bare skin round the lips.
-    base = base * _skin_gain(domain, base, reference, bare & plain.seen, shading, wide=True)
+    base = base * skin_gain(domain, base, reference, bare, shading)
     # 2. The change from the reference pose to this frame.
     if shading.mode == "ratio":
         base = base * change_ratio(domain, reference, frame, shading)[..., None]
     elif shading.mode == "difference":
         base = np.maximum(base + change_difference(domain, reference, frame, shading), 0.0)
     # 3. What is left at the border, faded out towards the middle of the lips.
-    return base * _skin_gain(domain, base, frame, bare & plain.seen, shading, wide=False)
+    return base * border_gain(domain, base, frame, bare, shading)[..., None]
+
+
+def bare_skin(domain: LipDomain, opacity: np.ndarray, gap_mm: float) -> np.ndarray:
+    """Texels of the outer face at least `gap_mm` away from what is painted, (h, w) bool."""
+    away = cv2.distanceTransform((opacity <= 0).astype(np.uint8), cv2.DIST_L2, 5)
+    return (away * domain.texel_mm > gap_mm) & domain.valid & ~domain.inner
 
 
 def change_ratio(
@@ -70,11 +79,12 @@ def change_ratio(
 ) -> np.ndarray:
     """Low-passed luminance of the frame over that of the reference, (h, w)."""
     weights = np.minimum(frame.weight, reference.weight)
+    if not weights.any():
+        return np.ones(domain.shape, dtype=np.float32)
     sigma = shading.sigma_mm / domain.texel_mm
-    now, support = weighted_blur(luminance(frame.rgb), weights, sigma)
-    then, _ = weighted_blur(luminance(reference.rgb), weights, sigma)
-    ratio = np.clip(now / np.maximum(then, 1e-4), 1.0 / shading.limit, shading.limit)
-    return fill_holes(ratio, support > _SUPPORT * weights.max(), sigma)
+    now, then = luminance(frame.rgb), luminance(reference.rgb)
+    ratio, enough = _ratio(now, then, weights, sigma, shading.limit)
+    return fill_holes(ratio, enough, sigma)
 
 
 def change_difference(
@@ -87,27 +97,39 @@ def change_difference(
     return fill_holes(change, support > _SUPPORT * weights.max(), sigma)
 
 
-def _skin_gain(
-    domain: LipDomain,
-    base: np.ndarray,
-    target: Texture,
-    bare: np.ndarray,
-    shading: Shading,
-    wide: bool,
+def skin_gain(
+    domain: LipDomain, base: np.ndarray, target: Texture, bare: np.ndarray, shading: Shading
 ) -> np.ndarray:
-    """Gain a channel, (h, w, 3), that brings `base` to the target's bare skin.
+    """Gain a channel, (h, w, 3), that brings `base` to the target's bare skin, continued inwards.
 
-    `wide` continues the gain over the lips; otherwise it fades to 1 away from the bare skin.
+    The light's colour and strength may differ between the two takes; both vary slowly.
     """
     weights = np.where(bare, target.weight, 0.0)
     if not weights.any():
         return np.ones_like(base)
+    sigma = 2.0 * shading.border_mm / domain.texel_mm
+    gain, enough = _ratio(target.rgb, base, weights, sigma, shading.limit)
+    return fill_holes(gain, enough, sigma)
+
+
+def border_gain(
+    domain: LipDomain, base: np.ndarray, target: Texture, bare: np.ndarray, shading: Shading
+) -> np.ndarray:
+    """Gain of luminance, (h, w), at the border of the painted region; 1 in the middle of the lips."""
+    weights = np.where(bare, target.weight, 0.0)
+    if not weights.any():
+        return np.ones(domain.shape, dtype=np.float32)
     sigma = shading.border_mm / domain.texel_mm
-    goal, support = weighted_blur(target.rgb, weights, sigma)
-    have, _ = weighted_blur(base, weights, sigma)
-    gain = np.clip(goal / np.maximum(have, 1e-4), 1.0 / shading.limit, shading.limit)
-    enough = support > _SUPPORT * weights.max()
-    if wide:
-        return fill_holes(gain, enough, 2 * sigma)
-    fade = np.clip(support / max(0.4 * float(weights.max()), 1e-9), 0.0, 1.0)[..., None]
-    return np.where(enough[..., None], 1.0 + (gain - 1.0) * fade, 1.0)
+    gain, enough = _ratio(luminance(target.rgb), luminance(base), weights, sigma, shading.limit)
+    support = blur(weights, sigma) / float(weights.max())
+    return np.where(enough, 1.0 + (gain - 1.0) * np.clip(support / 0.4, 0.0, 1.0), 1.0)
+
+
+def _ratio(
+    goal: np.ndarray, have: np.ndarray, weights: np.ndarray, sigma: float, limit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ratio of two low-passed images within 1/limit and limit, and where it is supported."""
+    above, support = weighted_blur(goal, weights, sigma)
+    below, _ = weighted_blur(have, weights, sigma)
+    ratio = np.clip(above / np.maximum(below, 1e-4), 1.0 / limit, limit)
+    return ratio, support > _SUPPORT * weights.max()

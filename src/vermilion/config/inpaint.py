@@ -1,0 +1,122 @@
+"""Configuration of the removal of the lip tattoo (Lips16 3.2.1)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class DomainConfig(StageConfig):
+    """The patch of the lips in texture space."""
+
+    texel_mm: float = Field(
+        0.2, ge=0.05, le=1.0, description="Edge of a texel on the neutral face (mm)."
+    )
+    skin_mm: float = Field(
+        14.0,
+        ge=6.0,
+        le=40.0,
+        description="How far the texture reaches onto the skin round the lips (mm).",
+    )
+    inner_mm: float = Field(
+        6.0, ge=0.0, le=20.0, description="How far it reaches inside the mouth, past the red (mm)."
+    )
+    edge_mm: float = Field(
+        0.8,
+        ge=0.0,
+        le=5.0,
+        description="Surface closer than this to an occluding contour is not sampled (mm): about "
+        "the error of the meshes.",
+    )
+
+
+class MaskConfig(StageConfig):
+    """Where the tattoo is: the tattooed neutral compared with the plain one."""
+
+    reach_mm: float = Field(
+        4.0,
+        ge=0.0,
+        le=20.0,
+        description="The tattoo is looked for up to this far from the red of the lips (mm).",
+    )
+    sensitivity: float = Field(
+        6.0,
+        ge=1.0,
+        le=50.0,
+        description="Colour differences of more than this many deviations of bare skin are tattoo.",
+    )
+    closing_mm: float = Field(
+        1.5, ge=0.0, le=10.0, description="Gaps of the pattern narrower than this are painted (mm)."
+    )
+    border_mm: float = Field(
+        0.6, ge=0.0, le=5.0, description="Margin painted in full round the tattoo (mm)."
+    )
+    feather_mm: float = Field(
+        1.0, ge=0.0, le=10.0, description="Width of the soft border outside that margin (mm)."
+    )
+
+
+class ShadingConfig(StageConfig):
+    """How the shading of a frame is carried over to the plain texture."""
+
+    mode: Literal["ratio", "difference", "none"] = Field(
+        "ratio",
+        description="Change from the reference pose to a frame: `ratio` of intensities, `difference` "
+        "(Lips16 as written), or `none`.",
+    )
+    sigma_mm: float = Field(
+        2.0, ge=0.2, le=20.0, description="Gaussian low-pass of that change (mm)."
+    )
+    border_mm: float = Field(
+        2.0, ge=0.2, le=20.0, description="Gaussian low-pass of the match to the bare skin (mm)."
+    )
+    gap_mm: float = Field(
+        1.0,
+        ge=0.0,
+        le=5.0,
+        description="Skin closer than this to the painted region is not compared with (mm).",
+    )
+    limit: float = Field(
+        2.5,
+        ge=1.0,
+        le=10.0,
+        description="Largest gain of the shading; its inverse is the smallest.",
+    )
+
+
+class CompositeConfig(StageConfig):
+    """How the texture is rendered into a frame."""
+
+    samples: int = Field(3, ge=1, le=8, description="Rays a pixel, along each side (count).")
+    lens_px: float = Field(
+        0.5, ge=0.0, le=5.0, description="Blur of the camera: deviation of a Gaussian (pixels)."
+    )
+    rim_px: float = Field(
+        2.5,
+        ge=0.0,
+        le=10.0,
+        description="Pixels of the mouth opening this close to the lips are freed of the tattoo that "
+        "the lens mixed into them (pixels).",
+    )
+    grain: bool = Field(
+        True, description="Add the noise that the picture has and the texture lacks."
+    )
+    seed: int = Field(0, ge=0, description="Seed of that noise.")
+
+
+class InpaintConfig(StageConfig):
+    """Removal of the lip tattoo (Lips16 3.2.1)."""
+
+    domain: DomainConfig = Field(
+        default_factory=DomainConfig, description="The patch of the lips in texture space."
+    )
+    mask: MaskConfig = Field(default_factory=MaskConfig, description="Where the tattoo is.")
+    shading: ShadingConfig = Field(
+        default_factory=ShadingConfig, description="How shading is carried over."
+    )
+    composite: CompositeConfig = Field(
+        default_factory=CompositeConfig, description="How the texture is rendered into a frame."
+    )

@@ -1,0 +1,50 @@
+"""Sharpness and noise of the painted region, matched to the picture round it."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+
+from vermilion.images import linear_to_srgb, srgb_to_linear
+from vermilion.inpaint.fields import blur, luminance
+
+_FINE_PX = 1.5  # scales finer than this Gaussian count as grain
+
+
+def fine_deviation(linear: np.ndarray, where: np.ndarray) -> float:
+    """Robust deviation of the fine scales of display luminance over a mask (h, w), in [0, 1]."""
+    grey = linear_to_srgb(luminance(linear))
+    inside = where.astype(np.float32)
+    support = np.maximum(blur(inside, _FINE_PX), 1e-3)
+    fine = (grey - blur(grey * inside, _FINE_PX) / support)[where]
+    if len(fine) < 50:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(fine - np.median(fine))))
+
+
+def missing_grain(picture: np.ndarray, rendered: np.ndarray, where: np.ndarray) -> float:
+    """Deviation of the noise that a rendering lacks, from bare skin that both show."""
+    have, want = fine_deviation(rendered, where), fine_deviation(picture, where)
+    return float(np.sqrt(max(want**2 - have**2, 0.0)))
+
+
+def add_grain(
+    linear: np.ndarray, opacity: np.ndarray, deviation: float, seed: tuple[int, ...]
+) -> np.ndarray:
+    """A copy of (h, w, 3) with grey noise of a display deviation where it is painted.
+
+    The noise has the spectrum of a picture after demosaicing and compression: hardly any at the
+    finest scale.
+    """
+    if deviation <= 0:
+        return linear
+    noise = blur(np.random.default_rng(seed).standard_normal(opacity.shape), 0.5)
+    noise *= deviation / max(float(noise.std()), 1e-9)
+    display = linear_to_srgb(linear) + (noise * opacity)[..., None]
+    return np.where(opacity[..., None] > 0, srgb_to_linear(np.clip(display, 0, 1)), linear)
+
+
+def seed_of(seed: int, subject: str, take: str, frame: int) -> tuple[int, ...]:
+    """Seed of one frame's noise; independent of chunks and order."""
+    return seed, zlib.crc32(f"{subject}/{take}".encode()), frame

@@ -1,0 +1,135 @@
+"""One frame without its tattoo (Lips16 3.2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.images import linear_to_srgb
+from vermilion.inpaint.bake import Texture, bake
+from vermilion.inpaint.composite import Window, composite, opened_by_darkness, render_layer, softened, window_of
+from vermilion.inpaint.domain import LipDomain
+from vermilion.inpaint.fields import luminance, weighted_blur
+from vermilion.inpaint.grain import add_grain, missing_grain
+from vermilion.inpaint.shading import Shading, bare_skin, equalised
+from vermilion.raycast import RayCaster
+
+
+@dataclass(frozen=True)
+class Paint:
+    """All that does not change from frame to frame of a take.
+
+    Attributes:
+        domain: the lips in texture space.
+        plain: texture without tattoo.
+        reference: the tattooed neutral in the painted camera.
+        opacity: (h, w) what is painted.
+        shading: how shading is carried over.
+        edge_mm: surface closer than this to an occluding contour is not sampled.
+        lens_px: blur of the camera's lens.
+        rim_px: how far that blur reaches into the mouth opening.
+        samples: rays a pixel, a side.
+        grain: match the picture's noise.
+    """
+
+    domain: LipDomain
+    plain: Texture
+    reference: Texture
+    opacity: np.ndarray
+    shading: Shading
+    edge_mm: float = 0.8
+    lens_px: float = 0.5
+    rim_px: float = 2.5
+    samples: int = 3
+    grain: bool = True
+
+
+@dataclass(frozen=True)
+class Painted:
+    """A frame without its tattoo.
+
+    Attributes:
+        linear: (h, w, 3) float32, the whole picture.
+        window: the rectangle that was worked on.
+        composited_px: pixels painted at more than half.
+        border_levels: mean colour difference between the painted texture and the picture on the
+            bare skin next to the border, in levels of 8 bit display colour.
+    """
+
+    linear: np.ndarray
+    window: Window
+    composited_px: int
+    border_levels: float
+
+
+def paint_frame(
+    paint: Paint,
+    linear: np.ndarray,
+    camera: Camera,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    seed: tuple[int, ...],
+) -> Painted | None:
+    """Paint the lips of one picture; None where they lie outside of it.
+
+    Args:
+        linear: (h, w, 3) picture of `camera`.
+        vertices_mm: (V, 3) of H at this frame.
+        seed: of the noise.
+    """
+    domain = paint.domain
+    window = window_of(domain, camera, vertices_mm, triangles, margin_px=8)
+    if window is None:
+        return None
+    caster = RayCaster(vertices_mm, triangles)
+    frame = bake(domain, vertices_mm, triangles, [(camera, linear)], paint.edge_mm)
+    texture = equalised(domain, paint.plain, paint.reference, frame, paint.opacity, paint.shading)
+    layer = render_layer(domain, texture, paint.opacity, caster, camera, window, paint.samples)
+    layer = softened(layer, paint.lens_px)
+    pixel_mm = _pixel_mm(camera, vertices_mm[np.unique(triangles[domain.in_domain])])
+    reach_px = paint.edge_mm / pixel_mm
+    layer = opened_by_darkness(layer, linear, _darkest(paint), reach_px)
+    result = composite(linear, layer, paint.rim_px)
+    # The same rendering on the bare skin, to compare with the picture.
+    bare = bare_skin(domain, paint.opacity, 0.0).astype(np.float32)
+    skin = render_layer(domain, texture, bare, caster, camera, window, paint.samples)
+    only_skin = skin.opacity > 0.99
+    patch = linear[window.slices]
+    rendered = softened(skin, paint.lens_px).rgb
+    if paint.grain:
+        lacking = missing_grain(patch, rendered, only_skin)
+        result[window.slices] = add_grain(result[window.slices], layer.opacity, lacking, seed)
+    near = only_skin & _within(layer.opacity, 4.0)
+    return Painted(
+        result,
+        window,
+        int((layer.opacity > 0.5).sum()),
+        _colour_levels(patch, rendered, only_skin, near),
+    )
+
+
+def _darkest(paint: Paint) -> float:
+    """Luminance that the painted lips hardly ever fall below, half of the darkest hundredth."""
+    lips = paint.reference.seen & (paint.opacity > 0.99)
+    return 0.5 * float(np.percentile(luminance(paint.reference.rgb[lips]), 1)) if lips.any() else 0.0
+
+
+def _pixel_mm(camera: Camera, points_mm: np.ndarray) -> float:
+    """Size of a pixel on the lips."""
+    return float(np.median(camera.to_camera(points_mm)[:, 2]) / camera.calibration[0, 0])
+
+
+def _within(opacity: np.ndarray, distance_px: float) -> np.ndarray:
+    return weighted_blur(opacity, np.ones_like(opacity), distance_px / 2)[0] > 0.01
+
+
+def _colour_levels(
+    picture: np.ndarray, rendered: np.ndarray, known: np.ndarray, where: np.ndarray
+) -> float:
+    if not where.any():
+        return 0.0
+    difference = linear_to_srgb(rendered) - linear_to_srgb(picture)
+    smooth, _ = weighted_blur(difference, known.astype(np.float32), 2.0)
+    return float(np.abs(smooth[where]).mean() * 255)
