@@ -45,15 +45,15 @@ rule contour_detector:
         R + "/logs/contour_detector/{subject}-{take}.log",
     benchmark:
         R + "/benchmarks/contour_detector/{subject}-{take}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=30,
     params:
         cfg=cfg_of("contours.detector"),
         code=code_of("contour_detector"),
         source=mono_sources,
         capture=source_of,
         camera=mono_camera,
-    resources:
-        mem_mb=1500,
-        runtime=30,
     script:
         "../scripts/contour_detector.py"
 
@@ -72,14 +72,14 @@ rule contours:
         R + "/logs/contours/{subject}-{take}-{chunk}.log",
     benchmark:
         R + "/benchmarks/contours/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=60,
     params:
         cfg=cfg_of("contours.maps"),
         code=code_of("contours"),
         source=mono_source,
         capture=source_of,
         camera=mono_camera,
-    resources:
-        mem_mb=1000,
-        runtime=60,
     script:
         "../scripts/contours.py"

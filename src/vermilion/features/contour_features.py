@@ -1,0 +1,100 @@
+"""Contours and distances of a frame, from the coarse mesh and the likelihood maps (Lips16 5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.faces.model import FaceModel
+from vermilion.features.distances import contour_distances
+from vermilion.features.rings import Ring, lip_rings
+from vermilion.features.search import SearchSettings, find_inner, find_outer
+from vermilion.landmarks.scheme import EYE_CORNERS
+
+
+@dataclass(frozen=True)
+class FrameContours:
+    """Contours of a frame.
+
+    Attributes:
+        distances: (20,) of `distances.NAMES`.
+        outer_px, inner_px: (n, 2).
+        model_outer_px, model_inner_px: (n, 2) the coarse mesh's own.
+        outer_found, inner_found: (n,) bool; elsewhere the model's contour stands in.
+        interocular_px: the unit of the distances.
+    """
+
+    distances: np.ndarray
+    outer_px: np.ndarray
+    inner_px: np.ndarray
+    model_outer_px: np.ndarray
+    model_inner_px: np.ndarray
+    outer_found: np.ndarray
+    inner_found: np.ndarray
+    interocular_px: float
+
+
+@dataclass(frozen=True)
+class ContourSampler:
+    """Finds contours from coarse meshes of one face model; build it once.
+
+    Attributes:
+        outer, inner: rings of samples on the model.
+        eye_corners: two vertices.
+        settings: of the search.
+    """
+
+    outer: Ring
+    inner: Ring
+    eye_corners: np.ndarray
+    settings: SearchSettings = field(default_factory=SearchSettings)
+
+    @classmethod
+    def of(cls, model: FaceModel, n_samples: int, settings: SearchSettings) -> ContourSampler:
+        outer, inner = lip_rings(model, n_samples)
+        return cls(outer, inner, model.landmarks[EYE_CORNERS], settings)
+
+    def find(
+        self,
+        vertices_mm: np.ndarray,
+        camera: Camera,
+        maps: tuple[np.ndarray, np.ndarray] | None,
+    ) -> FrameContours:
+        """Contours of a coarse mesh (V, 3) in the world; `maps` (inner, outer), or None.
+
+        Without maps the model's own contours are given, none of them found.
+        """
+        unit = interocular_px(vertices_mm[self.eye_corners], camera)
+        model_outer = camera.project(self.outer.points(vertices_mm))
+        model_inner = camera.project(self.inner.points(vertices_mm))
+        if maps is None:
+            outer, inner = model_outer, model_inner
+            outer_found = inner_found = np.zeros(len(outer), dtype=bool)
+        else:
+            found = find_outer(maps[1], model_outer, unit, self.settings)
+            outer, outer_found = found.points_px, found.found
+            found = find_inner(maps[0], outer, model_inner, unit, self.settings)
+            inner, inner_found = found.points_px, found.found
+        return FrameContours(
+            contour_distances(outer, inner, unit),
+            outer,
+            inner,
+            model_outer,
+            model_inner,
+            outer_found,
+            inner_found,
+            unit,
+        )
+
+
+def interocular_px(corners_mm: np.ndarray, camera: Camera) -> float:
+    """Inter-ocular distance (2, 3) mm as it would look parallel to the image, in pixels.
+
+    Unlike the distance of the projected corners it does not shrink when the head turns.
+    """
+    half = 0.5 * np.linalg.norm(corners_mm[1] - corners_mm[0]) * camera.rotation[0]
+    middle = corners_mm.mean(axis=0)
+    ends = camera.project(np.stack([middle - half, middle + half]))
+    return float(np.linalg.norm(ends[1] - ends[0]))

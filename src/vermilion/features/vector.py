@@ -1,0 +1,117 @@
+"""The feature vector of every frame of a chunk: shape coefficients, then contour distances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.errors import InputError
+from vermilion.features.contour_features import FrameContours
+from vermilion.features.distances import NAMES
+from vermilion.files import atomic_path
+from vermilion.quality import QualityRow
+
+ARRAYS = ("frames", "features", "names", "outer_px", "inner_px", "valid", "found")
+
+
+@dataclass(frozen=True)
+class FeatureTable:
+    """Features of some frames of a take (Lips16 5.1).
+
+    Attributes:
+        frames: (F,) int.
+        features: (F, M) float64: |psi| shape coefficients in mm, 20 distances per inter-ocular
+            distance.
+        names: (M,) str.
+        outer_px, inner_px: (F, n, 2) contours in the image.
+        valid: (F,) bool.
+        found: (F, 2) share of the outer and of the inner samples that met a maximum.
+    """
+
+    frames: np.ndarray
+    features: np.ndarray
+    names: np.ndarray
+    outer_px: np.ndarray
+    inner_px: np.ndarray
+    valid: np.ndarray
+    found: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        frames: Sequence[int],
+        shape: np.ndarray,
+        contours: Sequence[FrameContours],
+        valid: Sequence[bool],
+    ) -> FeatureTable:
+        """Join shape coefficients (F, P) and the contours of the same frames."""
+        distances = np.stack([entry.distances for entry in contours])
+        found = [[entry.outer_found.mean(), entry.inner_found.mean()] for entry in contours]
+        return cls(
+            np.asarray(frames, dtype=np.int64),
+            np.concatenate([shape, distances], axis=1),
+            feature_names(shape.shape[1]),
+            np.stack([entry.outer_px for entry in contours]),
+            np.stack([entry.inner_px for entry in contours]),
+            np.asarray(valid, dtype=bool),
+            np.asarray(found),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+            np.savez_compressed(stream, **{name: getattr(self, name) for name in ARRAYS})
+
+    @classmethod
+    def load(cls, paths: str | Path | Sequence[str | Path]) -> FeatureTable:
+        """Read one file, or join several. Raises InputError where one is not what `save` wrote."""
+        paths = [paths] if isinstance(paths, str | Path) else list(paths)
+        parts = [_read(path) for path in paths]
+        joined = {
+            name: np.concatenate([part[name] for part in parts])
+            for name in ARRAYS
+            if name != "names"
+        }
+        return cls(names=parts[0]["names"], **joined)
+
+
+def feature_names(n_shape: int) -> np.ndarray:
+    """Names of the features, (M,) str."""
+    return np.array([*(f"shape_{k + 1:02d}" for k in range(n_shape)), *NAMES])
+
+
+def judge(
+    frame: int, contours: FrameContours, tracked: bool, has_maps: bool, least_found: float
+) -> QualityRow:
+    """What is to be said of a frame: valid when tracked, and enough of its outer contour found."""
+    outer, inner = contours.outer_found.mean(), contours.inner_found.mean()
+    away = np.linalg.norm(contours.outer_px - contours.model_outer_px, axis=1)
+    figures = {
+        "outer_found_share": float(outer),
+        "inner_found_share": float(inner),
+        "model_to_outer_px": float(away.mean()),
+        "interocular_px": contours.interocular_px,
+    }
+    if not tracked:
+        return QualityRow(frame, False, "not tracked", figures)
+    if not has_maps:
+        return QualityRow(frame, False, "no contour maps", figures)
+    if outer < least_found:
+        return QualityRow(frame, False, f"only {outer:.0%} of the outer contour found", figures)
+    return QualityRow(frame, figures=figures)
+
+
+def _read(path: str | Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in ARRAYS}
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(
+            f"an unreadable feature file ({error})",
+            f"a .npz with {', '.join(ARRAYS)}",
+            "Remove the file and run again.",
+            path=path,
+        ) from error
