@@ -21,14 +21,14 @@ class CorrespondenceConfig(StageConfig):
     landmark_weight: float = Field(
         0.3, gt=0.0, le=100.0, description="Weight of a landmark beside bending (1/mm^2)."
     )
-    smoothing_lengths_mm: list[float] = Field(
-        [20.0, 12.0, 8.0, 5.0, 5.0],
+    wavelengths_mm: list[float] = Field(
+        [100.0, 60.0, 40.0, 25.0, 15.0, 15.0],
         min_length=1,
-        description="One dense step each: differences of the two surfaces narrower than this are "
+        description="One dense step each: differences of the two surfaces of a shorter wavelength are "
         "smoothed away (mm).",
     )
     search_distance_mm: float = Field(
-        10.0,
+        25.0,
         gt=0.0,
         le=100.0,
         description="Farther closest points do not pull at the registration (mm).",

@@ -87,7 +87,7 @@ def correspond_neutrals(
     template: FaceModel,
     *,
     landmarks: str = "picture",
-    search_distance_mm: float = 10.0,
+    search_distance_mm: float = 25.0,
     max_distance_mm: float = 4.0,
     **settings,
 ) -> tuple[Correspondence, Mesh, tuple[SurfaceMap, SurfaceMap]]:

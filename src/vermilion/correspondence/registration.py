@@ -4,7 +4,7 @@ The coarse mesh moves by a displacement d that minimises its bending and its dis
 
     integral |Laplace d|^2 dA  +  sum_k w_k |B_k d - r_k|^2,
 
-first with the landmarks alone as targets, then with landmarks and closest points in turn, the length
+first with the landmarks alone as targets, then with landmarks and closest points in turn, the wavelength
 under which differences are smoothed away growing shorter.
 """
 
@@ -64,8 +64,8 @@ def register(
     sides_coarse: np.ndarray | None = None,
     sides_accurate: np.ndarray | None = None,
     landmark_weight: float = 0.3,
-    smoothing_lengths_mm: Sequence[float] = (20.0, 12.0, 8.0, 5.0, 5.0),
-    search_distance_mm: float = 10.0,
+    wavelengths_mm: Sequence[float] = (100.0, 60.0, 40.0, 25.0, 15.0, 15.0),
+    search_distance_mm: float = 25.0,
     max_angle_deg: float = 70.0,
 ) -> Mesh:
     """The coarse mesh laid over the accurate one, in the accurate one's frame.
@@ -76,7 +76,7 @@ def register(
             end are left out.
         sides_coarse, sides_accurate: (V,) in -1, 0, 1: lower lip, neither, upper lip.
         landmark_weight: weight of a landmark beside bending (1 / mm^2).
-        smoothing_lengths_mm: one dense step each; differences narrower than this are smoothed.
+        wavelengths_mm: one dense step each; differences of a shorter wavelength are smoothed.
         search_distance_mm: farther closest points are no targets.
         max_angle_deg: between the normals of a vertex and its target.
 
@@ -99,7 +99,7 @@ def register(
     triangle_sides = (
         None if sides_accurate is None else sides_of_triangles(accurate, sides_accurate)
     )
-    for length in smoothing_lengths_mm:
+    for wavelength in wavelengths_mm:
         targets, distance = closest_on_surface(
             vertices,
             accurate,
@@ -112,12 +112,14 @@ def register(
         found = targets.sample(accurate.vertices_mm, accurate.triangles)
         residuals = np.where(used[:, None], found - placed.vertices_mm, 0.0)
         # Landmarks guide the first steps and fade: the surfaces say more than single pixels.
-        share = min(1.0, (length / smoothing_lengths_mm[0]) ** 2)
+        share = min(1.0, (wavelength / wavelengths_mm[0]) ** 2)
         stacked = sparse.vstack([sparse.identity(len(vertices), format="csr"), sampling])
         vertices = placed.vertices_mm + deformer.displacement(
             stacked,
             np.concatenate([residuals, wanted - sampling @ placed.vertices_mm]),
-            np.concatenate([areas * used / length**4, share * landmark_weights]),
+            np.concatenate(
+                [areas * used * (2 * np.pi / wavelength) ** 4, share * landmark_weights]
+            ),
         )
     return placed.with_vertices(vertices)
 
