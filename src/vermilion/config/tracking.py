@@ -107,6 +107,17 @@ class MeshesConfig(StageConfig):
     )
 
 
+class ExternalConfig(StageConfig):
+    """Mesh sequences of other trackers (takes of role `tracked`)."""
+
+    unit_mm: float | None = Field(
+        None,
+        gt=0,
+        le=1e6,
+        description="Length of a unit in the files (mm). Empty: USD files say it, others are in mm.",
+    )
+
+
 class TrackingConfig(StageConfig):
     """The coarse monocular track (Lips16 3.2, Mono13 6)."""
 
@@ -116,3 +127,6 @@ class TrackingConfig(StageConfig):
     identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
     motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
     meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")
+    external: ExternalConfig = Field(
+        default_factory=ExternalConfig, description="Mesh sequences of other trackers."
+    )

@@ -168,7 +168,9 @@ class _TakeProblem:
         self, points: np.ndarray, frames: slice
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         image = project(points, self.focal)
-        white = whitening(image, self.sigma_px[frames], self.seen.trust[frames], self.settings.jaw_slide)
+        white = whitening(
+            image, self.sigma_px[frames], self.seen.trust[frames], self.settings.jaw_slide
+        )
         residual = (white @ (image - self.seen.image[frames])[..., None])[..., 0]
         return image, white, residual
 
@@ -220,9 +222,7 @@ class _TakeProblem:
         return jacobian.reshape(len(x), -1, jacobian.shape[-1]), residual
 
     def largest_move_mm(self, a: np.ndarray, b: np.ndarray) -> float:
-        return float(
-            np.linalg.norm(self._camera_points(a) - self._camera_points(b), axis=-1).max()
-        )
+        return float(np.linalg.norm(self._camera_points(a) - self._camera_points(b), axis=-1).max())
 
     def motion(self, x: np.ndarray) -> HeadMotion:
         image = project(self._camera_points(x), self.focal)

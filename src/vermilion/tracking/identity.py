@@ -262,7 +262,9 @@ class _IdentityProblem:
         image = project(self._camera_points(frames, shared), self._focal(shared))
         squared = ((image - self.image) ** 2).sum(axis=-1)[:, 17:]
         focal = np.exp(shared[self.n_identity + 198 :])
-        known = [s.focal_px if s.calibrated else f for s, f in zip(self.samples, focal, strict=True)]
+        known = [
+            s.focal_px if s.calibrated else f for s, f in zip(self.samples, focal, strict=True)
+        ]
         return IdentityFit(
             identity=shared[: self.n_identity].copy(),
             landmark_offset_mm=shared[self.n_identity : self.n_identity + 198].reshape(66, 3),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,17 @@ class Observations:
 def focal_px(camera: Camera) -> float:
     """The camera's x focal length."""
     return float(camera.calibration[0, 0])
+
+
+def with_focal(camera: Camera, focal: float | None) -> Camera:
+    """The camera with another focal length, its ratio y to x kept; the same where it is None."""
+    if focal is None:
+        return camera
+    model = camera.colmap()
+    ratio = focal / focal_px(camera)
+    params = np.array(camera.params, dtype=np.float64)
+    params[model.focal_length_idxs()] *= ratio
+    return replace(camera, params=tuple(float(p) for p in params))
 
 
 def project(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:

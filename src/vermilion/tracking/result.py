@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
 from vermilion.files import atomic_path
 from vermilion.tracking.expression import HeadMotion
+from vermilion.tracking.identity import IdentityFit, TakeSample
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,18 @@ class Identity:
     takes: np.ndarray
     focal_px: np.ndarray
     calibrated: np.ndarray
+
+    @classmethod
+    def of(cls, fit: IdentityFit, model: FaceModel, samples: Sequence[TakeSample]) -> Identity:
+        """Of a fit to the samples of some takes."""
+        return cls(
+            identity=fit.identity,
+            neutral_mm=model.neutral_of(fit.identity),
+            landmark_offset_mm=fit.landmark_offset_mm,
+            takes=np.array([sample.name for sample in samples], dtype=str),
+            focal_px=np.array([fit.focal_px[sample.name] for sample in samples]),
+            calibrated=np.array([sample.calibrated for sample in samples]),
+        )
 
     def focal_of(self, take: str) -> float | None:
         """Estimated focal length of a take; None where the take is unknown or calibrated."""
@@ -116,7 +130,12 @@ class TrackedTake:
         width, height = (int(n) for n in self.camera_size_px)
         params = tuple(float(p) for p in self.camera_params)
         return Camera(
-            str(self.camera_name), str(self.camera_model), params, width, height, self.cam_from_world
+            str(self.camera_name),
+            str(self.camera_model),
+            params,
+            width,
+            height,
+            self.cam_from_world,
         )
 
     def index_of(self, frames: np.ndarray | list[int]) -> np.ndarray:

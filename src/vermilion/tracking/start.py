@@ -55,9 +55,7 @@ def first_guess(
     return rotation, translation, weights
 
 
-def fill_gaps(
-    values: np.ndarray, known: np.ndarray, n_frames: int
-) -> np.ndarray:
+def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarray:
     """Values (M, P) of the frames `known` (M,) to all frames (n_frames, P): linear, ends held."""
     every = np.arange(n_frames)
     columns = [np.interp(every, known, column) for column in values.T]

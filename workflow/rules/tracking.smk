@@ -1,0 +1,192 @@
+"""The coarse sequence C (Lips16 3.2, Mono13 6): who it is, then pose and blend weights."""
+
+TRACKED_ROLES = ("tattoo", "video")
+
+
+def external_takes(wildcards=None):
+    """Regular expression of the takes that bring their own meshes (none: matches nothing)."""
+    names = sorted({take.take.replace(".", r"\.") for take in takes("tracked")})
+    return "|".join(names) or "(?!)"
+
+
+def identity_takes(wildcards):
+    """The takes of a subject that landmarks are found in."""
+    found = takes(TRACKED_ROLES, wildcards.subject)
+    if not found:
+        raise WorkflowError(
+            f"subject {wildcards.subject}: found no take of role {' or '.join(TRACKED_ROLES)}; "
+            f"expected one to track. Add it to {CONFIG.takes}."
+        )
+    return found
+
+
+def of_identity_takes(pattern):
+    """Input function: `pattern` for every take of a subject, and every chunk where it has them."""
+
+    def inputs(wildcards):
+        paths = []
+        for take in identity_takes(wildcards):
+            if "{chunk}" in pattern:
+                paths += expand_chunks(pattern, take.subject, take.take)
+            else:
+                paths.append(pattern.format(subject=take.subject, take=take.take))
+        return paths
+
+    return inputs
+
+
+rule identity:
+    """Finds the person in landmarks of frames of all takes: subjects/{subject}/identity.npz."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
+        cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
+        calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
+    output:
+        identity=R + "/subjects/{subject}/identity.npz",
+    log:
+        R + "/logs/identity/{subject}.log",
+    benchmark:
+        R + "/benchmarks/identity/{subject}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("tracking.fit", "tracking.identity"),
+        code=code_of("identity"),
+        takes=lambda wildcards: [
+            {
+                "take": t.take,
+                "camera": mono_camera(t),
+                "neutral": t.first if t.is_multiview else None,
+                "chunks": len(chunks(t.subject, t.take)),
+            }
+            for t in identity_takes(wildcards)
+        ],
+    script:
+        "../scripts/identity.py"
+
+
+rule tracking:
+    """Fits pose and blend weights of a whole take to its landmarks: tracking/fit.npz."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        identity=R + "/subjects/{subject}/identity.npz",
+        landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
+        cameras=R + "/takes/{subject}/{take}/cameras",
+    output:
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+    log:
+        R + "/logs/tracking/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/tracking/{subject}-{take}.tsv"
+    resources:
+        mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
+        runtime=60,
+    params:
+        cfg=cfg_of("tracking.fit", "tracking.motion"),
+        code=code_of("tracking"),
+        camera=mono_camera,
+        fps=lambda wildcards: take_of(wildcards).fps,
+    script:
+        "../scripts/tracking.py"
+
+
+rule tracking_meshes:
+    """Writes C of a chunk in the world, and the model over the pictures: tracking/C/{chunk}.npy."""
+    input:
+        unpack(mono_inputs),
+        tracker=R + "/face/tracker.npz",
+        identity=R + "/subjects/{subject}/identity.npz",
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
+    output:
+        meshes=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
+        quality=R + "/takes/{subject}/{take}/tracking/quality/{chunk}.tsv",
+        overlay=R + "/takes/{subject}/{take}/tracking/overlay/{chunk}.png",
+    log:
+        R + "/logs/tracking_meshes/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/tracking_meshes/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of("tracking.meshes"),
+        code=code_of("tracking_meshes"),
+        source=mono_source,
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+    script:
+        "../scripts/tracking_meshes.py"
+
+
+rule tracking_topology:
+    """Writes the triangles of C beside its chunks: tracking/C/topology.ply."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        identity=R + "/subjects/{subject}/identity.npz",
+    output:
+        R + "/takes/{subject}/{take}/tracking/C/topology.ply",
+    log:
+        R + "/logs/tracking_topology/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/tracking_topology/{subject}-{take}.tsv"
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime=10,
+    params:
+        code=code_of("tracking_topology"),
+    script:
+        "../scripts/tracking_topology.py"
+
+
+rule tracked_meshes:
+    """Reads C of a take that another tracker made (role `tracked`)."""
+    input:
+        source=source_of,
+    output:
+        meshes=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
+    log:
+        R + "/logs/tracked_meshes/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/tracked_meshes/{subject}-{take}-{chunk}.tsv"
+    wildcard_constraints:
+        take=external_takes(),
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("tracking.external"),
+        code=code_of("tracked_meshes"),
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+    script:
+        "../scripts/tracked_meshes.py"
+
+
+rule tracked_topology:
+    """Writes the triangles of a sequence that another tracker made (role `tracked`)."""
+    input:
+        source=source_of,
+    output:
+        R + "/takes/{subject}/{take}/tracking/C/topology.ply",
+    log:
+        R + "/logs/tracked_topology/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/tracked_topology/{subject}-{take}.tsv"
+    wildcard_constraints:
+        take=external_takes(),
+    localrule: True
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("tracking.external"),
+        code=code_of("tracked_topology"),
+        first=lambda wildcards: take_of(wildcards).first,
+    script:
+        "../scripts/tracked_topology.py"
+
+
+ruleorder: tracked_meshes > tracking_meshes
+ruleorder: tracked_topology > tracking_topology

@@ -1,0 +1,17 @@
+"""The topology of a mesh sequence that another tracker made."""
+
+from vermilion.logfile import log_to
+from vermilion.mesh import Mesh
+from vermilion.sequences import write_ply
+from vermilion.tracking.external import read_tracked
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    sequence = read_tracked(
+        snakemake.input.source,
+        [snakemake.params.first],
+        snakemake.params.cfg["tracking.external"]["unit_mm"],
+        subject=snakemake.wildcards.subject,
+        take=snakemake.wildcards.take,
+    )
+    write_ply(snakemake.output[0], Mesh(sequence.vertices_mm[0], sequence.triangles))

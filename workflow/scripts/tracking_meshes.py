@@ -1,0 +1,38 @@
+"""The coarse meshes of a chunk in the world, their quality rows, the model over the pictures."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.frames import open_frames
+from vermilion.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.logfile import log_to
+from vermilion.quality import write_quality
+from vermilion.sequences import write_sequence
+from vermilion.tracking.judge import quality_rows
+from vermilion.tracking.overlay import tracking_overlay
+from vermilion.tracking.result import Identity, TrackedTake
+
+
+def main(snakemake):
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    inputs, frames = snakemake.input, snakemake.params.frames
+    tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    rows = fit.index_of(frames)
+    vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows)
+    picture = tracking_overlay(
+        open_frames(snakemake.params.source, subject, take),
+        fit.camera,
+        tracker,
+        frames,
+        vertices,
+        LandmarkTrack.load(inputs.landmarks),
+        fit.valid[rows],
+        snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
+    )
+    write_srgb8(snakemake.output.overlay, picture)
+    write_quality(snakemake.output.quality, subject, take, "tracking", quality_rows(fit, rows))
+    write_sequence(snakemake.output.meshes, vertices)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

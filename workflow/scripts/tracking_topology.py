@@ -1,0 +1,13 @@
+"""The topology of the coarse sequence: the person's neutral in the head frame."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.logfile import log_to
+from vermilion.mesh import Mesh
+from vermilion.sequences import write_ply
+from vermilion.tracking.result import Identity
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    tracker = FaceModel.load(snakemake.input.tracker)
+    neutral = Identity.load(snakemake.input.identity).neutral_mm
+    write_ply(snakemake.output[0], Mesh(neutral, tracker.triangles))
