@@ -70,6 +70,21 @@ def smooth_loop(
     return closed_loop(graph, waypoints)
 
 
+def without_spurs(loop: np.ndarray) -> np.ndarray:
+    """A closed vertex loop without the places where it runs to a vertex and straight back."""
+    vertices = loop.tolist()
+    index = 0
+    while index < len(vertices) and len(vertices) > 3:
+        following = vertices[(index + 1) % len(vertices)]
+        if vertices[index - 1] == following:
+            for drop in sorted({index, (index + 1) % len(vertices)}, reverse=True):
+                del vertices[drop]
+            index = max(index - 2, 0)
+        else:
+            index += 1
+    return np.array(vertices, dtype=loop.dtype)
+
+
 def _spline(knots: np.ndarray) -> np.ndarray:
     """Dense points of the natural cubic spline through the knots, (60 n, 3)."""
     chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from vermilion.errors import InputError
 from vermilion.faces.binding import bind_to_surface
-from vermilion.faces.contours import closed_loop, edge_graph
+from vermilion.faces.contours import closed_loop, edge_graph, without_spurs
 from vermilion.faces.model import FaceModel
 
 #: Weight of jawOpen at which the lips are so far apart that neither binds to the other.
@@ -152,7 +152,7 @@ def _contour(
     steps = np.linspace(0, len(loop), 12, endpoint=False).astype(int)
     near = [int(np.argmin(np.linalg.norm(vertices - pose[loop[i]], axis=1))) for i in steps]
     waypoints = np.array(list(dict.fromkeys(near)))
-    coarse = closed_loop(graph, waypoints)
+    coarse = without_spurs(closed_loop(graph, waypoints))
     movable = coarse[~np.isin(coarse, landmarks)]
     _, line, fraction = _nearest_on_lines(vertices[movable], pose, lines)
     corners[movable, 0], corners[movable, 1] = lines[line, 0], lines[line, 1]

@@ -67,7 +67,7 @@ def template_model(
         n_identities: identity modes.
     """
     layout = Layout(
-        spacing_mm, coarsening=1.15, vermilion_rings=_rings(10.5, spacing_mm),
+        spacing_mm, coarsening=1.25, vermilion_rings=_rings(10.5, spacing_mm),
         fold_rings=_rings(6.5, spacing_mm), offset=0.37,
     )  # fmt: skip
     mesh = build_head_mesh(layout)
@@ -111,7 +111,6 @@ def _head_model(
     name: str, mesh: HeadMesh, shapes: tuple[str, ...], rolls: bool, n_identities: int
 ) -> FaceModel:
     fields = Fields(mesh)
-    outer = np.isnan(mesh.theta) & ~_behind_lids(mesh)
     return FaceModel(
         name=name,
         neutral_mm=mesh.point_mm,
@@ -120,18 +119,11 @@ def _head_model(
         expressions_mm=expressions(fields, shapes, rolls),
         identities_mm=identities(fields, n_identities).astype(np.float32),
         uv=mesh.uv.astype(np.float32),
-        landmarks=landmarks(mesh, outer),
+        landmarks=landmarks(mesh),
         outer_contour=mesh.border.astype(np.int32),
         inner_contour=mesh.meeting.astype(np.int32),
         regions=head_regions(mesh),
     )
-
-
-def _behind_lids(mesh: HeadMesh) -> np.ndarray:
-    """(V,) vertices of the strips behind the lid margins: they come last."""
-    behind = np.zeros(len(mesh.s), dtype=bool)
-    behind[int(np.flatnonzero(~np.isnan(mesh.theta)).max()) + 1 :] = True
-    return behind
 
 
 def _with_parts(head: FaceModel) -> FaceModel:

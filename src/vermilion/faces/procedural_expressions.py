@@ -21,7 +21,8 @@ JAW_MOTIONS: dict[str, tuple[float, tuple[float, float, float]]] = {
 
 def jaw_motion_of(f: Fields, name: str) -> np.ndarray:
     open_rad, shift = JAW_MOTIONS[name]
-    return f.jaw(open_rad, shift)
+    narrower = -2.5 * f.u**3 * (open_rad / JAW_OPEN_RAD)  # an opening mouth draws its corners in
+    return f.jaw(open_rad, shift) + f.lips(narrower, 0.0, 0.0)
 
 
 def mouth_close(f: Fields) -> np.ndarray:
@@ -34,16 +35,17 @@ def mouth_close(f: Fields) -> np.ndarray:
 
 def mouth_pucker(f: Fields, rolls: bool) -> np.ndarray:
     out = f.lips(
-        -0.36 * 26.0 * f.u * (1 - 0.1 * f.u**2),
-        0.9 * f.upper - 0.5 * f.lower,
-        6.0 + 1.5 * np.abs(f.u) ** 2,
+        -11.0 * f.u * (1 - 0.1 * f.u**2),
+        0.8 * f.upper - 0.4 * f.lower,
+        6.5 + 2.0 * np.abs(f.u) ** 2,
         48.0,
     )
-    return out + (f.roll(-0.35 * f.middle) if rolls else 0.0)
+    out = out + f.thin(-0.15 * f.middle)
+    return out + (f.roll(-0.3 * f.middle) if rolls else 0.0)
 
 
 def mouth_funnel(f: Fields, rolls: bool) -> np.ndarray:
-    out = f.lips(-0.24 * 26.0 * f.u, 4.5 * f.upper - 6.0 * f.lower, 5.0 * np.ones_like(f.u), 46.0)
+    out = f.lips(-7.5 * f.u, 4.2 * f.upper - 6.0 * f.lower, 5.0 + 2.0 * f.u**2, 46.0)
     return out + (f.roll(-0.5 * f.middle) if rolls else 0.0)
 
 
@@ -79,8 +81,8 @@ def mouth_dimple(f: Fields, side: float) -> np.ndarray:
 
 def mouth_press(f: Fields, side: float, rolls: bool) -> np.ndarray:
     half = f.half(side) * f.middle
-    lips = f.lips(0.0, 0.0, -1.2 * half, 22.0)
-    roll = f.roll(0.35 * half) if rolls else 0.0
+    lips = f.lips(0.0, 0.0, -1.0 * half, 22.0)
+    roll = f.roll(0.25 * half) if rolls else 0.0
     return lips + roll + f.thin(0.30 * half)
 
 
@@ -97,10 +99,12 @@ def mouth_lower_down(f: Fields, side: float) -> np.ndarray:
 def mouth_roll(f: Fields, lip: np.ndarray, sign: float, inward: bool) -> np.ndarray:
     """`sign` +1 for the upper lip. Inward: the red turns into the mouth; outward: it everts."""
     lip = f.widened(lip)
-    if inward:
-        draw = f.lips(0.0, -sign * 1.2 * lip, -3.2 * lip, 22.0)
-        return f.roll(1.05 * lip) + draw + f.thin(0.22 * lip)
-    return f.roll(-0.85 * lip) + f.lips(0.0, sign * 1.4 * lip, 1.6 * lip, 24.0)
+    if not inward:
+        return f.roll(-0.5 * lip, 14.0) + f.lips(0.0, sign * 2.2 * lip, 2.0 * lip, 26.0)
+    # The lower lip is fuller, and has more room before the teeth.
+    angle, deeper, thinner = (1.1, -3.0, 0.26) if sign > 0 else (1.3, -4.2, 0.38)
+    draw = f.lips(0.0, -sign * 0.3 * lip, deeper * lip, 22.0)
+    return f.roll(angle * lip, 13.0) + draw + f.thin(thinner * lip, 12.0)
 
 
 def mouth_shrug(f: Fields, lip: np.ndarray, up: float) -> np.ndarray:
@@ -108,9 +112,9 @@ def mouth_shrug(f: Fields, lip: np.ndarray, up: float) -> np.ndarray:
 
 
 def cheek_puff(f: Fields) -> np.ndarray:
-    out = f.lips(0.0, 0.0, 2.0 * np.ones_like(f.u), 34.0)
+    out = f.lips(0.0, 0.0, 2.0 + 2.5 * f.u**2, 40.0)
     for side in (1.0, -1.0):
-        out = out + f.bumped(side * 44, -38, 14, 14, (side * 6.5, 0.0, 7.0))
+        out = out + f.bumped(side * 47, -36, 15, 15, (side * 6.5, 0.0, 6.0))
     return out
 
 
@@ -166,7 +170,7 @@ def _library(rolls: bool) -> dict[str, Callable[[Fields], np.ndarray]]:
     shapes["mouthRollOutUpper"] = lambda f: mouth_roll(f, f.upper, 1.0, False)
     shapes["mouthRollOutLower"] = lambda f: mouth_roll(f, f.lower, -1.0, False)
     shapes["mouthShrugUpper"] = lambda f: mouth_shrug(f, f.upper, 2.5)
-    shapes["mouthShrugLower"] = lambda f: mouth_shrug(f, f.lower, 1.0)
+    shapes["mouthShrugLower"] = lambda f: mouth_shrug(f, f.lower + 0.7 * f.upper, 1.0)
     shapes["cheekPuff"] = cheek_puff
     shapes |= _sided("cheekSquint", cheek_squint)
     shapes |= _sided("noseSneer", nose_sneer)

@@ -151,7 +151,8 @@ class Fields:
     ) -> np.ndarray:
         """Move the front of the face by `move` under a Gaussian at (x0, y0)."""
         front = smoothstep(0.0, 35.0, self.mesh.point_mm[:, 2])
-        weight = bump(self._x, self._y, x0, y0, sx, sy) * front * (self.mesh.s == 0)
+        off_lips = smoothstep(1.0, 16.0, self.mesh.distance_mm)
+        weight = bump(self._x, self._y, x0, y0, sx, sy) * front * off_lips
         weight = weight * np.clip(weight - 0.004, 0, 1) / np.maximum(weight, 1e-9)
         return weight[:, None] * np.asarray(move)
 

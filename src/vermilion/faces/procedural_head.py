@@ -19,6 +19,7 @@ MOUTH_ANGLE = np.deg2rad(112.5)
 EYE_CENTRE_MM = np.array([31.5, 27.0, 63.5])  # subject's left
 EYE_RADIUS_MM = 12.0
 LID_RADIUS_MM = 13.2
+_FRONTAL_STRETCH = 0.23  # of the azimuth, so that chart squares are squares of skin at the mouth
 
 # Meridians: polar angle in degrees, then coordinates in millimetres.
 _FRONT = np.array(  # angle, y, z at the middle of the face, without nose and lips
@@ -34,8 +35,8 @@ _SIDE = np.array(  # angle, x, y, z at the subject's left
     [
         (0, 0, 136, -8), (15, 28, 132, -8), (30, 52, 120, -8), (45, 67, 100, -9),
         (60, 74, 76, -10), (75, 76, 48, -10), (90, 73, 18, -8), (100, 70, -6, -6),
-        (110, 66.5, -28, -3), (120, 61, -48, 0), (128, 55.5, -63, 2), (135, 49, -76, -2),
-        (143, 46, -88, -8), (152, 47.5, -102, -14), (165, 54, -126, -20),
+        (110, 65.5, -28, -3), (120, 59, -48, 0), (128, 52.5, -63, 2), (135, 46, -76, -2),
+        (143, 43.5, -88, -8), (152, 45, -102, -14), (165, 51, -126, -20),
     ],
     dtype=float,
 )  # fmt: skip
@@ -48,17 +49,18 @@ _BACK = np.array(
     dtype=float,
 )  # fmt: skip
 _ROUNDNESS = np.array(  # angle, superellipse exponent of the front half's cross-section
-    [(0, 2.0), (40, 2.1), (65, 2.35), (90, 2.1), (105, 2.0), (120, 2.0), (130, 2.1), (145, 2.0),
+    [(0, 2.0), (40, 2.1), (65, 2.35), (90, 2.1), (105, 1.97), (118, 1.82), (128, 1.72), (136, 1.8), (150, 2.0),
      (165, 2.0)], dtype=float,
 )  # fmt: skip
 _NOSE_HEIGHT = np.array(  # y, height of the ridge over the face
-    [(60, 0), (50, 0.0), (42, 0.8), (34, 3.0), (26, 7.0), (14, 13.5), (4, 18.5), (-5, 23.0),
-     (-10, 23.5), (-15, 18.0), (-20, 9.5), (-25, 4.5), (-31, 1.5), (-38, 0), (-50, 0)],
+    [(60, 0), (50, 0.0), (42, 0.8), (34, 3.0), (26, 7.0), (14, 13.5), (4, 18.0), (-2, 20.3),
+     (-6, 21.2), (-10, 20.6), (-14, 17.4), (-18, 11.5), (-22, 6.2), (-26, 3.2), (-31, 1.2),
+     (-38, 0), (-50, 0)],
     dtype=float,
 )[::-1]  # fmt: skip
 _NOSE_WIDTH = np.array(  # y, half width of the ridge
-    [(60, 9), (42, 7.5), (34, 6.5), (24, 6.2), (12, 8.0), (0, 9.5), (-8, 10.5), (-16, 10.5),
-     (-24, 8), (-38, 6), (-50, 6)], dtype=float,
+    [(60, 12), (42, 10.5), (34, 9.2), (24, 9.4), (12, 11.0), (0, 11.5), (-8, 11.0), (-16, 10.5),
+     (-24, 8.5), (-38, 6), (-50, 6)], dtype=float,
 )[::-1]  # fmt: skip
 
 
@@ -95,7 +97,18 @@ def chart_angles(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     turned = 1j * w
     z = (turned + centre) / (1 + centre * turned)
     polar = 2 * np.arctan(np.abs(z) * np.tan(RIM_ANGLE / 2))
-    return polar, np.angle(z)
+    azimuth = np.angle(z)
+    return polar, azimuth + _FRONTAL_STRETCH * np.sin(2 * azimuth)
+
+
+def chart_of(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    """Inverse of `chart_angles`: the chart point (N,) complex of angles (radians)."""
+    grid = np.linspace(-np.pi, np.pi, 4001)
+    plain = np.interp(azimuth, grid + _FRONTAL_STRETCH * np.sin(2 * grid), grid)
+    rim = np.tan(RIM_ANGLE / 2)
+    centre = np.tan(MOUTH_ANGLE / 2) / rim
+    z = np.tan(polar / 2) / rim * np.exp(1j * plain)
+    return -1j * (z - centre) / (1 - centre * z)
 
 
 def base_point(w: np.ndarray) -> np.ndarray:
@@ -131,7 +144,7 @@ def _face_relief(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return (
         3.2 * bump(x, y, 27, 46, 15, 6.5)  # brow ridge
         - 1.0 * bump(x, y, 0, 46, 7, 6)
-        + 5.0 * bump(x, y, 46, 0, 15, 13)  # cheek bone
+        + 5.8 * bump(x, y, 47, 0, 15, 13)  # cheek bone
         + 1.8 * bump(x, y, 30, -4, 11, 9)
         - 3.2 * bump(x, y, 47, -36, 13, 15)  # hollow under the cheek bone
         - 2.0 * bump(x, y, 23, -15, 4.5, 9)  # beginning of the nasolabial fold
@@ -160,7 +173,7 @@ def skin_point(w: np.ndarray) -> np.ndarray:
     inside = LID_RADIUS_MM**2 - (x - ex) ** 2 - (y - ey) ** 2
     ball = ez + np.sign(inside) * np.sqrt(np.abs(inside) + 1e-9)
     near_eye = bump(x, y, ex, ey, 16, 16) > 0.05
-    lids = np.where(near_eye, smooth_max(skin, ball, 2.2), skin)
+    lids = np.where(near_eye, smooth_max(skin, ball, 3.2), skin)
     fade = front * np.exp(-((((x - ex) / 22.0) ** 2 + ((y - ey) / 19.0) ** 2) ** 3))
     point[..., 2] = skin + fade * (lids - skin) + front * nose_z
     point[..., 1] = y + front * nose_y

@@ -18,7 +18,8 @@ from vermilion.faces.procedural_layout import (
 from vermilion.faces.procedural_mouth import border_chart, lip_point, socket_point
 
 N_LOOP = 160  # samples of the lips' loop that carry expression curves
-_LID_DEPTHS_MM = (0.9, 2.2, 4.0)
+CARRY_REACH_MM = 60.0  # skin farther from the lips never follows them
+_LID_RINGS = ((0.8, 0.0), (2.4, 0.07), (5.0, 0.26))  # depth (mm), share of the way to the middle
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,13 @@ class HeadMesh:
         chart: (V,) complex; of the border for vertices inside the mouth.
         theta: (V,) loop parameter, NaN on skin.
         s: (V,) depth: 0 on skin and border, in (0, 1] on the vermilion, above 1 inside.
-        spread: (V, N_LOOP) rows that carry a curve along the lips to the vertex; each sums to 1.
+        spread: (V, N_LOOP) rows that carry a curve along the lips to the vertex; each sums to 1 within
+            `CARRY_REACH_MM` of the lips, and to 0 beyond.
         distance_mm: (V,) to the vermilion border; 0 inside the mouth.
         border: (n,) ids of the vermilion border by theta.
         meeting: (n,) ids of the line where the lips meet.
         eyes: ids of the lid margins, subject's left and right, by phase.
+        anchors: landmark number -> vertex, for the landmarks off the eyes and lips.
         uv: (V, 2).
     """
 
@@ -49,6 +52,7 @@ class HeadMesh:
     border: np.ndarray
     meeting: np.ndarray
     eyes: tuple[np.ndarray, np.ndarray]
+    anchors: dict[int, int]
     uv: np.ndarray
 
     @property
@@ -94,11 +98,12 @@ def build_head_mesh(layout: Layout) -> HeadMesh:
         total += 1
 
     for ids, sign in zip(sheet.eyes, (1.0, -1.0), strict=True):
-        lid_points = _lid_rings(points[0][ids], sign)
+        lid_points = _lid_rings(points[0][ids])
         lids = [ids]
-        for ring in lid_points:
+        for k, ring in enumerate(lid_points):
             points.append(ring)
-            charts.append(sheet.chart[ids])
+            margin = sheet.chart[ids]
+            charts.append(margin + 0.12 * (k + 1) * (margin.mean() - margin))
             thetas.append(np.full(len(ids), np.nan))
             depths.append(np.zeros(len(ids)))
             lids.append(np.arange(total, total + len(ids)))
@@ -112,7 +117,7 @@ def build_head_mesh(layout: Layout) -> HeadMesh:
     meeting = rings[1 + steps.index(1.0)]
     return HeadMesh(
         point, np.concatenate(triangles), chart, theta, s, spread, distance,
-        rings[0], meeting, sheet.eyes, _uv(chart, theta, s, spread, distance),
+        rings[0], meeting, sheet.eyes, sheet.anchors, _uv(chart, theta, s, spread, distance),
     )  # fmt: skip
 
 
@@ -132,14 +137,14 @@ def _mouth_ring(theta: np.ndarray, s: np.ndarray, fold_end: float) -> np.ndarray
     return socket_point(theta, s, lip_point(theta, np.full(len(theta), 2.0)))
 
 
-def _lid_rings(margin: np.ndarray, sign: float) -> list[np.ndarray]:
+def _lid_rings(margin: np.ndarray) -> list[np.ndarray]:
     """Rings from the lid margin (n, 3) backwards, closing on the eyeball."""
     centre = margin.mean(axis=0)
     rings = []
-    for depth in _LID_DEPTHS_MM:
-        inward = margin + (centre - margin) * np.array([0.012, 0.03, 0.0]) * depth
-        inward[:, 2] -= depth
-        rings.append(inward)
+    for depth, share in _LID_RINGS:
+        ring = margin + (centre - margin) * np.array([share, share, 0.0])
+        ring[:, 2] -= depth
+        rings.append(ring)
     return rings
 
 
@@ -152,10 +157,12 @@ def _spread(point: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarra
     inside = ~np.isnan(theta)
     own = _interpolation_rows(np.where(inside, theta, fine_theta[nearest]))
     distance = np.where(inside, 0.0, distance)
-    squared = ((point[:, None, :] - border[None]) ** 2).sum(axis=-1)
-    # Where two lips are near, a skin point listens to both: inverse-distance weights, sharper close by.
-    weights = 1.0 / (squared + 4.0) ** 2
-    weights /= weights.sum(axis=1, keepdims=True)
+    # Where two lips are near, a skin point listens to both; nothing is carried beyond the reach.
+    near = distance < CARRY_REACH_MM
+    squared = ((point[near, None, :] - border[None]) ** 2).sum(axis=-1)
+    weights = np.zeros((len(point), N_LOOP))
+    weights[near] = 1.0 / (squared + 4.0) ** 2
+    weights[near] /= weights[near].sum(axis=1, keepdims=True)
     share = np.where(inside, 1.0, np.clip(1.0 - distance / 6.0, 0, 1) ** 2)[:, None]
     return own * share + weights * (1.0 - share), distance
 

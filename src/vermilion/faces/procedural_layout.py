@@ -7,14 +7,14 @@ of rings. Two layouts of different spacing share no vertex and no triangle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay
 
+from vermilion.faces.procedural_anchors import snap
 from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_scale_mm, locate
 from vermilion.faces.procedural_mouth import LIP_LOOP, border_chart
-
-N_STRIPS = 4  # rings of quads next to the border, before the free triangulation begins
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,11 @@ class Layout:
     fold_end: float = 2.0
 
     @property
+    def n_strips(self) -> int:
+        """Rings of quads next to the border, before the free triangulation begins."""
+        return int(np.clip(round(4.0 / self.spacing_mm), 1, 4))
+
+    @property
     def n_border(self) -> int:
         """Vertices round the mouth: a multiple of 4, for the corners and the middle of each lip."""
         return 4 * round(LIP_LOOP.length_mm / self.spacing_mm / 4)
@@ -48,23 +53,23 @@ class Layout:
     def spacing_at(self, distance_mm: float) -> float:
         """Wanted spacing (mm) at a distance from the border: fine on the face, coarse behind."""
         distances = [0.0, 4.0, 10.0, 25.0, 60.0, 105.0, 180.0, 400.0]
-        factors = [1.0, 1.15, 1.7, 2.3, 3.4, 4.6, 11.0, 22.0]
+        factors = [1.0, 1.15, 1.7, 2.3, 3.2, 5.0, 13.0, 30.0]
         factor = float(np.interp(distance_mm, distances, factors))
         return self.spacing_mm * (1.0 + (factor - 1.0) * self.coarsening)
 
 
 def ring_chart(theta: np.ndarray, border: np.ndarray, radius: float) -> np.ndarray:
     """Chart ring round the mouth: the border at radius 0, the chart's rim at radius 1."""
-    reach = 0.14
+    reach = 0.10
     fade = (1.0 - np.exp(-radius / reach)) / (1.0 - np.exp(-1.0 / reach))
     # Near the pointed corners of the mouth the way out is across the border, not along it.
-    squeeze = 1.0 - 0.88 * np.exp(-radius / 0.06)
+    squeeze = 1.0 - 0.88 * np.exp(-radius / 0.045)
     outward = squeeze * np.cos(theta) + 1j * np.sin(theta)
     return border * (1.0 - fade) + radius * outward / np.abs(outward)
 
 
 def skin_rings(layout: Layout) -> list[np.ndarray]:
-    """Chart rings of the skin from the border outwards; the first `N_STRIPS` + 1 are aligned."""
+    """Chart rings of the skin from the border outwards; the first `n_strips` + 1 are aligned."""
     scale = chart_scale_mm()
     dense = np.linspace(0, 2 * np.pi, 1441)
     dense_border = border_chart(dense[:-1])
@@ -78,11 +83,11 @@ def skin_rings(layout: Layout) -> list[np.ndarray]:
         if 1.0 - radius < 0.5 * spacing / scale:
             radius = 1.0
         count, turn = layout.n_border, 0.0
-        if len(rings) > N_STRIPS:
+        if len(rings) > layout.n_strips:
             perimeter = np.abs(np.diff(ring_chart(dense, dense_border, radius))).sum() * scale
             count = 2 * max(8, round(perimeter / spacing / 2))
             turn = 0.5 * (len(rings) % 2) + layout.offset
-        if len(rings) == N_STRIPS + 1:
+        if len(rings) == layout.n_strips + 1:
             count, turn = layout.n_border, 0.5
         theta = (np.arange(count) + turn) * (2 * np.pi / count)
         rings.append(ring_chart(theta, border_chart(theta), radius))
@@ -106,14 +111,12 @@ def eye_rings(layout: Layout) -> tuple[np.ndarray, list[np.ndarray]]:
     count = 2 * round(68.0 / spacing / 2)
     phase = np.arange(count) * (2 * np.pi / count)
     centre = EYE_CENTRE_MM[:2] + np.array([0.3, 0.6])
-    rings, distance, k = [locate(lid_margin_xy(phase))], 0.0, 0
+    rings, distance = [locate(lid_margin_xy(phase))], 0.0
     while distance < 12.0:
         distance += 0.9 * spacing * (1.0 + 0.07 * distance)
-        k += 1
-        turned = phase + 0.5 * (k % 2) * (2 * np.pi / count)
-        circle = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+        circle = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
         share = 1.0 - np.exp(-distance / 22.0)
-        xy = lid_margin_xy(turned) * (1 - share) + centre * share + distance * circle
+        xy = lid_margin_xy(phase) * (1 - share) + centre * share + distance * circle
         rings.append(locate(xy))
     return phase, rings
 
@@ -127,19 +130,24 @@ class SkinSheet:
         triangles: (T, 3) int32, counter-clockwise seen from outside.
         eyes: ids of the two lid margins, subject's left and right, by phase (mirrored on the right).
         phase: (n,) of the margins' vertices.
+        anchors: landmark number -> vertex, for the landmarks off the eyes and lips.
     """
 
     chart: np.ndarray
     triangles: np.ndarray
     eyes: tuple[np.ndarray, np.ndarray]
     phase: np.ndarray
+    anchors: dict[int, int]
 
 
 def skin_sheet(layout: Layout) -> SkinSheet:
     """Points and triangles of the skin, holes at mouth and eyes."""
     rings = skin_rings(layout)
     n = layout.n_border
-    strips, outer = np.concatenate(rings[: N_STRIPS + 1]), np.concatenate(rings[N_STRIPS + 1 :])
+    strips, outer = (
+        np.concatenate(rings[: layout.n_strips + 1]),
+        np.concatenate(rings[layout.n_strips + 1 :]),
+    )
     phase, left = eye_rings(layout)
     right = [-np.conj(ring) for ring in left]
     outer = outer[~_near_eyes(outer, left)]
@@ -149,10 +157,15 @@ def skin_sheet(layout: Layout) -> SkinSheet:
         charts.extend(eye)
         at += sum(len(ring) for ring in eye)
     chart = np.concatenate([*charts, outer])
+    free = np.ones(len(chart), dtype=bool)
+    free[: len(strips)] = False
+    free[np.concatenate(eyes)] = False
+    free[at : at + n] = False  # the ring that meets the strips
+    chart, anchors = snap(chart, free)
     aligned = np.arange(len(strips)).reshape(-1, n)
-    around = _triangulate(chart, (N_STRIPS * n), [aligned[-1], *eyes])
+    around = _triangulate(chart, layout.n_strips * n, [aligned[-1], *eyes])
     triangles = np.concatenate([strip_triangles(list(aligned[::-1])), around])
-    return SkinSheet(chart, triangles.astype(np.int32), tuple(eyes), phase)
+    return SkinSheet(chart, triangles.astype(np.int32), tuple(eyes), phase, anchors)
 
 
 def _near_eyes(chart: np.ndarray, left: list[np.ndarray]) -> np.ndarray:
@@ -202,7 +215,7 @@ def strip_triangles(rings: list[np.ndarray]) -> np.ndarray:
     Each ring runs counter-clockwise seen from outside, and the next lies within it.
     """
     parts = []
-    for k, (outer, inner) in enumerate(zip(rings[:-1], rings[1:], strict=True)):
+    for k, (outer, inner) in enumerate(pairwise(rings)):
         o1, i1 = np.roll(outer, -1), np.roll(inner, -1)
         if k % 2:
             parts += [np.stack([outer, o1, i1], -1), np.stack([outer, i1, inner], -1)]
@@ -214,8 +227,3 @@ def strip_triangles(rings: list[np.ndarray]) -> np.ndarray:
 def fan_triangles(ring: np.ndarray, centre: int) -> np.ndarray:
     """Close a ring with triangles to a centre vertex, oriented as `strip_triangles`."""
     return np.stack([ring, np.roll(ring, -1), np.full(len(ring), centre)], -1).astype(np.int32)
-
-
-def nearest_ids(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Index of the nearest of `points` (N, d) for each of `targets` (M, d)."""
-    return cKDTree(points).query(targets)[1].astype(np.int32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,9 +67,7 @@ def tooth_row(upper: bool, samples_per_tooth: int = 7) -> Part:
     joints = np.concatenate([[0.0], np.cumsum(widths)])
     joints = np.concatenate([-joints[:0:-1], joints])
     fine = np.linspace(0, 1, samples_per_tooth + 1)[:-1]
-    length = np.concatenate(
-        [a + (b - a) * fine for a, b in zip(joints[:-1], joints[1:], strict=True)]
-    )
+    length = np.concatenate([a + (b - a) * fine for a, b in pairwise(joints)])
     length = np.append(length, joints[-1])
     tooth = np.concatenate([np.tile(fine, len(joints) - 1), [0.0]])
     notch = np.abs(2 * tooth - 1) ** 6
