@@ -1,0 +1,65 @@
+"""The synthetic rig: ten cameras in pairs, aimed at this actor's face and lips."""
+
+import numpy as np
+import pytest
+
+from vermilion.camera import read_cameras, write_cameras
+from vermilion.faces.procedural import tracker_model
+from vermilion.studio import rig
+
+
+@pytest.fixture(scope="module")
+def face():
+    return tracker_model(n_triangles=2500)
+
+
+@pytest.fixture(scope="module")
+def cameras(face):
+    return rig.lips16_rig(face, face.neutral_mm, 735.0, (512, 512), (480, 384), 245.0, 105.0)
+
+
+def test_three_pairs_on_the_face_and_two_on_the_lips(cameras):
+    assert len(cameras) == 10
+    for left, right in rig.STEREO_PAIRS:
+        a, b = cameras[left], cameras[right]
+        baseline = np.linalg.norm(a.centre_mm - b.centre_mm)
+        assert 80 < baseline < 260  # mm
+        angle = np.degrees(np.arccos(a.rotation[2] @ b.rotation[2]))
+        assert 6 < angle < 20  # degrees between the axes of a pair
+
+
+def test_lip_cameras_look_at_the_middle_of_the_lips(face, cameras):
+    centre = rig.lips_centre(face, face.neutral_mm)
+    for name in rig.LIP_ANGLES_DEG:
+        camera = cameras[name]
+        middle = np.array([camera.width_px, camera.height_px]) / 2
+        assert np.linalg.norm(camera.project(centre) - middle) < 0.01  # px
+    heights = [cameras[name].centre_mm[1] - centre[1] for name in rig.LIP_ANGLES_DEG]
+    assert heights[0] > 0 and heights[2] < 0  # one pair from above, one from below
+
+
+def test_every_camera_sees_what_it_is_for(face, cameras):
+    landmarks = face.neutral_mm[face.landmarks]
+    for name in ("face2", "face3"):
+        camera = cameras[name]
+        assert camera.in_image(camera.project(landmarks), margin_px=5).all()
+    for camera in cameras.values():
+        lips = camera.project(face.neutral_mm[face.outer_contour])
+        assert camera.in_image(lips, margin_px=20).all()
+
+
+def test_the_rig_follows_the_actor(face, cameras):
+    shift = np.array([12.0, -7.0, 5.0])
+    moved = rig.lips16_rig(
+        face, face.neutral_mm + shift, 735.0, (512, 512), (480, 384), 245.0, 105.0
+    )
+    for name, camera in cameras.items():
+        assert np.allclose(moved[name].centre_mm - camera.centre_mm, shift)
+
+
+def test_cameras_survive_their_files(cameras, tmp_path):
+    write_cameras(tmp_path / "cameras", cameras)
+    again = read_cameras(tmp_path / "cameras")
+    point = np.array([[10.0, -30.0, 90.0]])
+    for name, camera in cameras.items():
+        assert np.abs(again[name].project(point) - camera.project(point)).max() < 1e-6  # px
