@@ -42,7 +42,7 @@ def turned(sequence: np.ndarray, degrees: float, shift) -> np.ndarray:
 
 def evaluate(model, regions, sequences, truth):
     reference = Reference("truth", truth, truth, model.triangles)
-    result = evaluate_take(sequences, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    result = evaluate_take(sequences, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
     rows = measure_rows(result.sums, "s", "t", len(FRAMES), 200, 0.95, 0)
     return result, rows.set_index(["measure", "region", "regressor"])["value"]
 
@@ -112,7 +112,7 @@ def test_vertices_without_a_counterpart_do_not_count(face):
     known = truth.copy()
     known[:, regions.lips == 1] = np.nan
     reference = Reference("truth", known, truth, model.triangles)
-    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
     rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
     value = rows.set_index(["measure", "region"])["value"]
     assert value["vertex_error_mean_mm", "vermilion"] < 1e-9
@@ -130,7 +130,7 @@ def test_mean_is_weighted_by_area_on_a_graded_mesh():
     inside = regions.weights["mouth"] > 0
     base[:, right & inside, 2] += 1.0
     reference = Reference("truth", truth, truth, model.triangles)
-    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 0.3, 1.0)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
     rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
     value = rows.set_index(["measure", "region"])["value"]["vertex_error_mean_mm", "mouth"]
     area = vertex_areas(crowded, model.triangles[mouth_triangles(model)])
@@ -144,7 +144,7 @@ def test_reconstruction_is_measured_without_alignment(face):
     reference = Reference("truth", truth, truth, model.triangles)
     shifted = truth + np.array([0.0, 0.0, 2.0])
     slid = np.zeros(truth.shape[:2])
-    sums = evaluate_reconstruction(shifted, FRAMES, regions, reference, slid, 2)
+    sums = evaluate_reconstruction(shifted, FRAMES, regions, reference, slid, 2, 1)
     rows = measure_rows(sums, "s", "t", 6, 200, 0.95, 0).set_index(["measure", "region"])["value"]
     assert rows["vertex_error_mean_mm", "face"] == pytest.approx(2.0, abs=1e-9)
     assert rows["drift_mm", "vermilion"] == 0.0

@@ -40,6 +40,7 @@ def test_histogram_quantile_is_the_weighted_quantile_within_a_bin():
 def test_clips_break_at_gaps_and_at_their_length():
     frames = np.array([3, 4, 5, 6, 10, 11, 12, 13, 14])
     assert clips_of(frames, 3).tolist() == [0, 0, 0, 1, 2, 2, 2, 3, 3]
+    assert clips_of(np.arange(9), 100, 3).tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
 
 
 def test_interval_covers_the_true_mean_about_as_often_as_it_says():

@@ -8,7 +8,14 @@ import pytest
 from tests.unit.evaluation_face import sheet_face
 from vermilion.camera import pinhole
 from vermilion.export.objs import write_obj
-from vermilion.export.overlay import crop_round, join_videos, overlay_picture, strips_following
+from vermilion.export.overlay import (
+    SKIN,
+    crop_round,
+    join_videos,
+    lip_colours,
+    overlay_picture,
+    strips_following,
+)
 from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
 from vermilion.export.weights import write_weights
 from vermilion.sequences import read_mesh
@@ -139,3 +146,14 @@ def test_strips_follow_the_lips_and_pass_over_a_lost_frame():
     assert {strip.size for strip in strips} == {(80, 40)}
     lefts = np.array([strip.left for strip in strips])
     assert np.abs(np.diff(lefts[8:22]) - 3).max() <= 1
+
+
+def test_lips_fade_into_the_skin():
+    model = sheet_face()
+    lips = model.regions["vermilion_upper"]
+    colours = lip_colours(model.triangles, lips)
+    assert colours.shape == (model.n_vertices, 3)
+    far = np.abs(model.neutral_mm[:, 1]) > 30
+    assert np.allclose(colours[far], SKIN)
+    middle = lips & (np.abs(model.neutral_mm[:, 0]) < 3) & (model.neutral_mm[:, 1] > 3)
+    assert (colours[middle, 0] - colours[middle, 1] > 0.1).all()

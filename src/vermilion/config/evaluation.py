@@ -36,6 +36,12 @@ class MeasuresConfig(StageConfig):
         ge=1,
         description="Length of the clips that the confidence intervals are taken over (frames).",
     )
+    min_clips: int = Field(
+        4,
+        ge=1,
+        le=100,
+        description="Clips are shorter where a take has too few frames for this many (clips).",
+    )
     bootstrap_samples: int = Field(
         1000, ge=100, le=100_000, description="Bootstrap samples of an interval (samples)."
     )

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from vermilion.camera import Camera, look_at, pinhole
 from vermilion.draw import colour_map
 from vermilion.evaluation.table1 import in_order, kind_of
-from vermilion.export.overlay import shade
+from vermilion.export.shading import shade
 from vermilion.files import atomic_path
 
 COLOURS = {
@@ -176,7 +176,7 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
         y += 0.5
     axis.set_yticks(places, names, fontsize=8)
     axis.invert_yaxis()
-    axis.set_xlim(0, 1.55 * max(table["mean_mm"].max(), 1e-3))
+    axis.set_xlim(0, 1.5 * np.nanmax([1e-3, *table["mean_mm"], *table["high_mm"]]))
     axis.set_xlabel("mean vertex error over the mouth mask, mm (line: interval over clips)")
     _plain(axis)
     axis.grid(False)

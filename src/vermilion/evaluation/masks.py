@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.evaluation.closest import Surface
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import vertex_areas
 
@@ -76,3 +77,22 @@ def regions_of_mask(
         "face": area(everywhere, face),
     }
     return Regions(weights, area(everywhere, face & ~touched), lips)
+
+
+def mask_on(
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    mask_vertices_mm: np.ndarray,
+    mask_triangles: np.ndarray,
+    reach_mm: float = 2.0,
+) -> np.ndarray:
+    """Triangles (T,) bool of a mesh that lie on the mask of another mesh in the same pose.
+
+    Args:
+        vertices_mm, triangles: the mesh, (V, 3) and (T, 3).
+        mask_vertices_mm: (V', 3) of the other mesh; mask_triangles: (M, 3), finite corners only.
+        reach_mm: largest distance between a triangle's middle and the mask.
+    """
+    finite = np.isfinite(mask_vertices_mm[mask_triangles]).all(axis=(1, 2))
+    surface = Surface(np.nan_to_num(mask_vertices_mm), mask_triangles[finite])
+    return surface.closest(vertices_mm[triangles].mean(axis=1)).distance_mm <= reach_mm

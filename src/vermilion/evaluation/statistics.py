@@ -60,12 +60,14 @@ def histogram_quantile(histogram: np.ndarray, q: float) -> np.ndarray:
     return np.where(cumulative[..., -1] > 0, value, np.nan)
 
 
-def clips_of(frames: np.ndarray, clip_frames: int) -> np.ndarray:
+def clips_of(frames: np.ndarray, clip_frames: int, min_clips: int = 1) -> np.ndarray:
     """Number of the clip of each frame (F,): runs of at most `clip_frames` consecutive frames.
 
-    A gap in the frame numbers starts a new clip.
+    A gap in the frame numbers starts a new clip. Clips are shorter where there are too few frames
+    for `min_clips` of them.
     """
     frames = np.asarray(frames)
+    clip_frames = max(1, min(clip_frames, len(frames) // min_clips))
     clips = np.zeros(len(frames), dtype=np.int64)
     for index in range(1, len(frames)):
         start = np.flatnonzero(clips == clips[index - 1])[0]

@@ -55,6 +55,7 @@ def evaluate_take(
     regions: Regions,
     reference: Reference,
     clip_frames: int,
+    min_clips: int,
     touch_mm: float,
     gape_mm: float,
 ) -> TakeResult:
@@ -68,13 +69,14 @@ def evaluate_take(
         frames: (F,) frame numbers.
         regions: of the topology of the sequences; vertices without a counterpart are left out here.
         reference: of the same frames.
+        clip_frames, min_clips: of `clips_of`.
     """
     regions = regions.restricted(reference.valid)
     rotations, translations = align_frames(sequences_mm["base"], reference.points_mm, regions.rest)
     aligned = {name: moved(s, rotations, translations) for name, s in sequences_mm.items()}
     neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
     head_rotations, _ = align_frames(reference.points_mm, neutral, regions.rest)
-    clips = clips_of(frames, clip_frames)
+    clips = clips_of(frames, clip_frames, min_clips)
     sides, columns = lip_sides(model), columns_of(model)
     true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
     surface = surface_errors(
@@ -103,6 +105,7 @@ def evaluate_reconstruction(
     reference: Reference,
     drift_mm: np.ndarray,
     clip_frames: int,
+    min_clips: int,
 ) -> dict[str, ClipSums]:
     """Measure **H** itself against known truth, in the rig's world, without alignment.
 
@@ -112,7 +115,7 @@ def evaluate_reconstruction(
         drift_mm: (F, V) of `drift`.
     """
     regions = regions.restricted(reference.valid)
-    clips = clips_of(frames, clip_frames)
+    clips = clips_of(frames, clip_frames, min_clips)
     surface = surface_errors(
         {"H": sequence_mm}, reference, regions.used, lambda items: progress(items, "H")
     )["H"]

@@ -14,9 +14,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from vermilion.camera import Camera
 from vermilion.draw import label
+from vermilion.export.shading import shade
 from vermilion.files import atomic_path
-from vermilion.mesh import adjacency, vertex_normals
-from vermilion.raycast import RayCaster, interpolate
+from vermilion.mesh import adjacency
 
 SKIN = (0.80, 0.79, 0.77)
 LIPS = (0.86, 0.53, 0.50)
@@ -126,40 +126,10 @@ def lip_colours(triangles: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
     """
     neighbours = adjacency(triangles, len(vermilion))
     share = vermilion.astype(float)
-    share = 0.5 * share + 0.5 * (neighbours @ share) / np.maximum(neighbours.sum(axis=1), 1)
+    share = 0.5 * share + 0.5 * (neighbours @ share) / np.maximum(
+        neighbours @ np.ones(len(share)), 1
+    )
     return np.array(SKIN) + share[:, None] * (np.array(LIPS) - SKIN)
-
-
-def shade(
-    picture: np.ndarray,
-    camera: Camera,
-    vertices_mm: np.ndarray,
-    triangles: np.ndarray,
-    colours: np.ndarray,
-    opacity: float,
-) -> np.ndarray:
-    """A shaded mesh over (h, w, 3) uint8: headlight from the upper left, a soft sheen, dark rims."""
-    hits = RayCaster(vertices_mm, triangles).see(camera)
-    inside = hits.hit
-    if not inside.any():
-        return picture
-    normals = interpolate(hits, triangles, vertex_normals(vertices_mm, triangles))[inside]
-    albedo = interpolate(hits, triangles, colours)[inside]
-    local = normals @ camera.rotation.T
-    towards = -camera.rays(camera.pixel_grid())[1][inside] @ camera.rotation.T
-    back = (local * towards).sum(axis=1) < 0
-    local[back] *= -1
-    light = np.array([-0.35, -0.45, -0.82]) / np.linalg.norm([-0.35, -0.45, -0.82])
-    diffuse = np.clip(local @ light, 0, 1)
-    half = light + towards
-    half /= np.linalg.norm(half, axis=1, keepdims=True)
-    sheen = 0.18 * np.clip((local * half).sum(axis=1), 0, 1) ** 25
-    value = albedo * (0.22 + 0.78 * diffuse)[:, None] + sheen[:, None]
-    value[back] *= 0.35
-    result = picture.copy()
-    mixed = picture[inside] * (1 - opacity) + 255 * np.clip(value, 0, 1) ** (1 / 1.3) * opacity
-    result[inside] = np.rint(np.clip(mixed, 0, 255)).astype(np.uint8)
-    return result
 
 
 def overlay_picture(

@@ -1,0 +1,71 @@
+"""Corrected meshes of held-out frames, with the time they took."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.correction.apply import Corrector, correct_with_layers
+from vermilion.correction.head import head_from_world, world_from_head
+from vermilion.regression.model import LipModel
+
+VARIANTS = ("affine", "shape-only", "distances-only")
+
+
+@dataclass(frozen=True)
+class CoarseTake:
+    """The coarse track of some frames.
+
+    Attributes:
+        coarse_mm: (F, V, 3) world; triangles: (T, 3); neutral_mm: (V, 3) of the subject.
+        rotation, translation_mm: `world_from_head`, (F, 3, 3) and (F, 3).
+        features: (F, M); NaN where a frame has none.
+        seam_mm: of the integration.
+    """
+
+    coarse_mm: np.ndarray
+    triangles: np.ndarray
+    neutral_mm: np.ndarray
+    rotation: np.ndarray
+    translation_mm: np.ndarray
+    features: np.ndarray
+    seam_mm: float
+
+
+def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
+    """Corrected meshes (F, V, 3) in the world, and seconds a frame from features to vertices.
+
+    The factorisation, once a person, is not in the time. Frames without features stay as they are.
+    """
+    corrector = Corrector(model, take.neutral_mm, take.triangles, take.seam_mm)
+    usable = np.isfinite(take.features).all(axis=1)
+    pose = take.rotation[usable], take.translation_mm[usable]
+    corrected = np.array(take.coarse_mm, dtype=np.float64)
+    if not usable.any():
+        return corrected, np.nan
+    # A first call compiles and warms what a long take pays for once.
+    corrector.correct(head_from_world(corrected[usable], *pose)[:1], take.features[usable][:1])
+    start = time.perf_counter()
+    head = head_from_world(corrected[usable], *pose)
+    corrected[usable] = world_from_head(corrector.correct(head, take.features[usable]), *pose)
+    return corrected, (time.perf_counter() - start) / int(usable.sum())
+
+
+def corrected_by_truth(
+    mask: np.ndarray, layers: np.ndarray, valid: np.ndarray, take: CoarseTake
+) -> np.ndarray:
+    """The oracle: the true layers (F, T, 9) of the triangles `mask` (T,) integrated, (F, V, 3)."""
+    return correct_with_layers(
+        mask, layers, take.coarse_mm, take.triangles, take.neutral_mm, take.rotation,
+        take.translation_mm, valid=valid, seam_mm=take.seam_mm,
+    )  # fmt: skip
+
+
+def measure_name(file_stem: str) -> str:
+    """Name in `measures.tsv` of a model file: `PS-s1-affine` -> `PS-s1/affine`."""
+    for variant in VARIANTS:
+        if file_stem.endswith(f"-{variant}"):
+            return f"{file_stem.removesuffix(f'-{variant}')}/{variant}"
+    return file_stem

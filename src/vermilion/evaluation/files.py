@@ -1,0 +1,88 @@
+"""Files that evaluation's rules hand to one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.errors import InputError
+from vermilion.evaluation.errors import ClipSums
+from vermilion.files import atomic_path
+
+
+@dataclass(frozen=True)
+class ErrorMaps:
+    """Meshes and errors of the frames that the report shows.
+
+    Attributes:
+        frames: (n,) frame numbers.
+        regressors: (R,) str.
+        meshes_mm: (R, n, V, 3) float32, head frame.
+        errors_mm: (R, n, V) float32; NaN where not measured.
+        triangles: (T, 3); mouth: (V,) bool.
+    """
+
+    frames: np.ndarray
+    regressors: np.ndarray
+    meshes_mm: np.ndarray
+    errors_mm: np.ndarray
+    triangles: np.ndarray
+    mouth: np.ndarray
+
+
+def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write `.npz` (no pickle), whole or not at all."""
+    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+        np.savez_compressed(stream, **arrays)
+
+
+def load_arrays(path: str | Path) -> dict[str, np.ndarray]:
+    """Read `.npz`; raises InputError where it is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in data.files}
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(
+            f"an unreadable file ({error})",
+            "a .npz of the evaluation",
+            "Remove the file and run again.",
+            path=path,
+        ) from error
+
+
+def save_sums(path: str | Path, sums: dict[str, ClipSums], n_frames: int) -> None:
+    """Write sums by clip of every regressor, names `<regressor>:<sum>`."""
+    arrays = {
+        f"{regressor}:{name}": values
+        for regressor, of_regressor in sums.items()
+        for name, values in of_regressor.sums.items()
+    }
+    save_arrays(path, {"n_frames": np.array(n_frames), **arrays})
+
+
+def load_sums(path: str | Path) -> tuple[dict[str, ClipSums], int]:
+    """Read what `save_sums` wrote: (regressor -> sums, frames)."""
+    arrays = load_arrays(path)
+    n_frames = int(arrays.pop("n_frames"))
+    sums: dict[str, dict[str, np.ndarray]] = {}
+    for key, values in arrays.items():
+        regressor, name = key.split(":", 1)
+        sums.setdefault(regressor, {})[name] = values
+    return {regressor: ClipSums(values) for regressor, values in sums.items()}, n_frames
+
+
+def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
+    """Frame numbers of chunk files `<first>-<last>.<suffix>` in their order."""
+    spans = [[int(number) for number in Path(path).stem.split("-")] for path in paths]
+    return np.concatenate([np.arange(first, last + 1) for first, last in spans])
+
+
+def read_chunks(paths: Sequence[str | Path], frames: np.ndarray, names: Sequence[str]) -> dict:
+    """Named arrays of chunk files `<first>-<last>.npz`, first axis frames, at `frames` (F,)."""
+    parts = [load_arrays(path) for path in paths]
+    row_of = {int(frame): row for row, frame in enumerate(frames_of(paths))}
+    rows = [row_of[int(frame)] for frame in frames]
+    return {name: np.concatenate([part[name] for part in parts])[rows] for name in names}

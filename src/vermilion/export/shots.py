@@ -1,0 +1,104 @@
+"""The overlay video of a stretch of a take, framed by the whole take's head motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.errors import InputError
+from vermilion.export.overlay import (
+    Crop,
+    crop_round,
+    lip_colours,
+    overlay_picture,
+    strips_following,
+)
+from vermilion.faces.model import FaceModel
+
+_STRIP_HEIGHT = 0.55  # of its width
+
+
+@dataclass(frozen=True)
+class Framing:
+    """What every frame of a take's overlay shows.
+
+    Attributes:
+        face: one crop for the whole take.
+        strips: (F) crops that follow the lips, one a frame of the take.
+        triangles: (T, 3) to draw; colours: (V, 3).
+    """
+
+    face: Crop
+    strips: list[Crop]
+    triangles: np.ndarray
+    colours: np.ndarray
+
+
+def framing(
+    model: FaceModel,
+    neutral_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    valid: np.ndarray,
+    camera: Camera,
+    margin: float,
+    height_px: int,
+) -> Framing:
+    """Crops from the neutral in every pose of the take, so that all chunks are framed alike.
+
+    Args:
+        neutral_mm: (V, 3) head frame.
+        rotation, translation_mm, valid: (F, 3, 3), (F, 3), (F,), `world_from_head` of the take.
+        height_px: of the face panel.
+    """
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+
+    def projected(vertices: np.ndarray) -> np.ndarray:
+        posed = neutral_mm[vertices] @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
+        pixels = camera.project(posed)
+        pixels[~valid] = np.nan
+        return pixels
+
+    size = (camera.width_px, camera.height_px)
+    outline = np.flatnonzero(model.regions["face"])[::7]
+    face = crop_round(projected(outline), size, margin, height_px)
+    width = face.size[0]
+    strip = (width, 2 * round(width * _STRIP_HEIGHT / 2))
+    strips = strips_following(projected(np.flatnonzero(lips)), 0.9, strip)
+    shown = model.regions["face"] | model.regions["mouth_inner"] | lips
+    triangles = model.triangles[shown[model.triangles].all(axis=1)]
+    return Framing(face, strips, triangles, lip_colours(model.triangles, lips))
+
+
+def overlay_frames(
+    view: Framing,
+    camera: Camera,
+    read: Callable[[int], np.ndarray],
+    frames: Sequence[int],
+    rows: Sequence[int],
+    valid: Sequence[bool],
+    meshes: Sequence[tuple[str, np.ndarray]],
+    opacity: float,
+    name: str,
+) -> Iterator[np.ndarray]:
+    """Pictures of the overlay of some frames, (h, w, 3) uint8.
+
+    Args:
+        read: frame -> (h, w, 3) uint8 sRGB; a picture that it cannot read (InputError) is black.
+        frames: frame numbers; rows: their rows in the take; valid: whether they were tracked.
+        meshes: (label, (F, V, 3) world mm) pairs of these frames.
+        name: of the take, for the caption.
+    """
+    for index, (frame, row, tracked) in enumerate(zip(frames, rows, valid, strict=True)):
+        try:
+            picture = read(frame)
+        except InputError:
+            picture = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
+        pairs = [(label, vertices[index] if tracked else None) for label, vertices in meshes]
+        yield overlay_picture(
+            picture, camera, [view.face, view.strips[row]], pairs, view.triangles, view.colours,
+            opacity, f"{name}  frame {frame}",
+        )  # fmt: skip

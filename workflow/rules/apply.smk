@@ -1,0 +1,89 @@
+"""Better lips for a video (Lips16 6): apply/<subject>/<take>/ with meshes, weights, USD, overlay."""
+
+APPLIED = R + "/apply/{subject}/{take}"
+
+
+def apply_model(wildcards):
+    """The regressor that the configuration names, for this subject."""
+    return f"{R}/models/{CONFIG.apply.regressor.replace('{subject}', wildcards.subject)}.h5"
+
+
+def apply_exports():
+    """Outputs of a corrected take; USD and OBJ as the configuration asks."""
+    outputs = {
+        "corrected": APPLIED + "/corrected.npy",
+        "mesh": APPLIED + "/mesh.ply",
+        "weights": APPLIED + "/weights.csv",
+        "overlay": report(
+            APPLIED + "/overlay.mp4",
+            category="Corrected takes",
+            labels={"take": "{subject}/{take}"},
+            caption="../report/overlay.rst",
+        ),
+    }
+    if CONFIG.apply.export.usd:
+        outputs["usd"] = APPLIED + "/corrected.usdc"
+    if CONFIG.apply.export.obj:
+        outputs["obj"] = directory(APPLIED + "/obj")
+    return outputs
+
+
+def apply_outputs():
+    """The overlay videos, and with them all files, of the takes to be corrected."""
+    return [f"{R}/apply/{name}/overlay.mp4" for name in CONFIG.apply.takes]
+
+
+rule apply:
+    """Corrects a chunk of a take and draws original, base and corrected side by side."""
+    input:
+        unpack(mono_inputs),
+        tracker=R + "/face/tracker.npz",
+        identity=R + "/subjects/{subject}/identity.npz",
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
+        features=R + "/takes/{subject}/{take}/correction/features/{chunk}.npz",
+        model=apply_model,
+    output:
+        corrected=APPLIED + "/chunks/{chunk}.npy",
+        overlay=APPLIED + "/chunks/{chunk}.mp4",
+        quality=APPLIED + "/quality/{chunk}.tsv",
+    log:
+        R + "/logs/apply/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/apply/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of("apply.overlay", "correction.integration"),
+        code=code_of("apply"),
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+        fps=lambda wildcards: take_of(wildcards).fps,
+        source=mono_source,
+        camera=mono_camera,
+    script:
+        "../scripts/apply.py"
+
+
+rule apply_export:
+    """Joins the chunks of a take into the files that Blender, Maya or Unreal open."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        corrected=per_chunk(APPLIED + "/chunks/{chunk}.npy"),
+        overlays=per_chunk(APPLIED + "/chunks/{chunk}.mp4"),
+    output:
+        **apply_exports(),
+    log:
+        R + "/logs/apply_export/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/apply_export/{subject}-{take}.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        cfg=cfg_of("apply.export"),
+        code=code_of("apply_export"),
+        fps=lambda wildcards: take_of(wildcards).fps,
+    script:
+        "../scripts/apply_export.py"

@@ -1,0 +1,215 @@
+"""Errors of every regressor on held-out frames (Lips16 6): evaluation/measures.tsv, table1.tsv.
+
+The only rules that read truth.
+"""
+
+
+def truth_files(subject, take):
+    """Vertices and triangles of a take's known truth; none where there is none."""
+    if CONFIG.evaluation.truth:
+        folder = Path(CONFIG.evaluation.truth) / subject / take
+        files = [folder / "vertices_mm.npy", folder / "triangles.npy"]
+        return [str(path) for path in files] if all(path.is_file() for path in files) else []
+    if _TAKES[f"{subject}/{take}"].source == STUDIO:
+        return [f"{R}/truth/{subject}/{take}/{name}.npy" for name in ("vertices_mm", "triangles")]
+    return []
+
+
+def neutral_truth_files(subject):
+    """Truth of the take whose first frame is the subject's neutral, in the world of H."""
+    neutral = takes("tattoo", subject)
+    return truth_files(subject, neutral[0].take) if neutral else []
+
+
+def has_truth(take):
+    """Whether a take can be followed in known truth: it has one, and so has the neutral."""
+    return bool(truth_files(take.subject, take.take) and neutral_truth_files(take.subject))
+
+
+def evaluated_takes():
+    """Takes with held-out frames of people with a correspondence, and with truth or H."""
+    people = set(subjects("tattoo"))
+    return [
+        take
+        for take in takes(("tattoo", "video", "tracked"))
+        if take.test_frames() and take.subject in people
+        if take.role == "tattoo" or has_truth(take)
+    ]
+
+
+def reconstructed_takes():
+    """Takes whose H can be held against known truth."""
+    return [take for take in takes("tattoo") if has_truth(take)]
+
+
+def evaluated_models(subject):
+    """Model files to measure on a person's takes: their PS, MS, the GR without them, variants."""
+    names = [name for name in (f"PS-{subject}", "MS", f"GR-{subject}") if name in regressor_names()]
+    names += [f"{name}-{variant}" for variant in CONFIG.evaluation.variants for name in names]
+    return [f"{R}/models/{name}.h5" for name in names]
+
+
+def evaluate_inputs(wildcards):
+    """Inputs that depend on the role of the take and on whether its truth is known."""
+    take = take_of(wildcards)
+    folder = f"{R}/takes/{take.subject}/{take.take}"
+    inputs = {"models": evaluated_models(take.subject)}
+    if take.role == "tattoo":
+        pattern = folder + "/correction/layers/{chunk}.npz"
+        inputs["layers"] = expand_chunks(pattern, take.subject, take.take)
+    if has_truth(take):
+        neutral = takes("tattoo", take.subject)[0].take
+        pattern = R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"
+        inputs["truth"] = truth_files(take.subject, take.take)
+        inputs["neutral_truth"] = neutral_truth_files(take.subject)
+        inputs["neutral_accurate"] = expand_chunks(pattern, take.subject, neutral)[0]
+    else:
+        pattern = folder + "/multiview/H/{chunk}.npy"
+        inputs["accurate"] = expand_chunks(pattern, take.subject, take.take)
+    return inputs
+
+
+def of_takes(pattern, rows):
+    """`pattern` for each of some takes."""
+    return [pattern.format(subject=take.subject, take=take.take) for take in rows]
+
+
+EVALUATED = R + "/evaluation/takes/{subject}/{take}"
+RECONSTRUCTED = R + "/evaluation/reconstruction/{subject}/{take}"
+
+
+rule evaluate:
+    """Applies every regressor to the held-out frames of a take and measures: measures.tsv."""
+    input:
+        unpack(evaluate_inputs),
+        tracker=R + "/face/tracker.npz",
+        template=R + "/face/template.npz",
+        correspondence=R + "/subjects/{subject}/correspondence.npz",
+        identity=R + "/subjects/{subject}/identity.npz",
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
+        features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
+    output:
+        measures=EVALUATED + "/measures.tsv",
+        sums=EVALUATED + "/sums.npz",
+        frames=EVALUATED + "/frames.tsv",
+        maps=EVALUATED + "/maps.npz",
+        quality=EVALUATED + "/quality.tsv",
+    log:
+        R + "/logs/evaluate/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/evaluate/{subject}-{take}.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=120,
+    params:
+        cfg=cfg_of(
+            "evaluation.reference",
+            "evaluation.measures",
+            "evaluation.figures.map_frames",
+            "correction.integration",
+        ),
+        code=code_of("evaluate"),
+        frames=lambda wildcards: take_of(wildcards).test_frames(),
+        first=lambda wildcards: take_of(wildcards).first,
+    script:
+        "../scripts/evaluate.py"
+
+
+rule evaluate_reconstruction:
+    """Measures H itself against known truth: surface error, vertex error, drift."""
+    input:
+        template=R + "/face/template.npz",
+        correspondence=R + "/subjects/{subject}/correspondence.npz",
+        accurate=per_chunk(R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"),
+        truth=lambda wildcards: truth_files(wildcards.subject, wildcards.take),
+    output:
+        measures=RECONSTRUCTED + "/measures.tsv",
+        sums=RECONSTRUCTED + "/sums.npz",
+    log:
+        R + "/logs/evaluate_reconstruction/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/evaluate_reconstruction/{subject}-{take}.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=120,
+    params:
+        cfg=cfg_of("evaluation.reference", "evaluation.measures"),
+        code=code_of("evaluate_reconstruction"),
+        first=lambda wildcards: take_of(wildcards).first,
+    script:
+        "../scripts/evaluate_reconstruction.py"
+
+
+rule evaluation_figures:
+    """Error-coloured renders from front and side, and curves over time (Lips16 fig. 14 to 16)."""
+    input:
+        maps=EVALUATED + "/maps.npz",
+        frames=EVALUATED + "/frames.tsv",
+    output:
+        maps=report(
+            EVALUATED + "/error_maps.png",
+            category="Errors",
+            subcategory="Error maps",
+            labels={"take": "{subject}/{take}"},
+            caption="../report/error_maps.rst",
+        ),
+        curves=report(
+            EVALUATED + "/curves.png",
+            category="Errors",
+            subcategory="Over time",
+            labels={"take": "{subject}/{take}"},
+            caption="../report/curves.rst",
+        ),
+    log:
+        R + "/logs/evaluation_figures/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/evaluation_figures/{subject}-{take}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=20,
+    params:
+        cfg=cfg_of("evaluation.figures"),
+        code=code_of("evaluation_figures"),
+    script:
+        "../scripts/evaluation_figures.py"
+
+
+rule measures:
+    """Joins the measures of all takes, and the takes together: measures.tsv, table1.tsv."""
+    input:
+        takes=of_takes(EVALUATED + "/sums.npz", evaluated_takes()),
+        reconstructions=of_takes(RECONSTRUCTED + "/sums.npz", reconstructed_takes()),
+        tables=of_takes(EVALUATED + "/measures.tsv", evaluated_takes())
+        + of_takes(RECONSTRUCTED + "/measures.tsv", reconstructed_takes()),
+    output:
+        measures=report(
+            R + "/evaluation/measures.tsv",
+            category="Tables",
+            labels={"table": "all measures"},
+            caption="../report/measures.rst",
+        ),
+        table1=report(
+            R + "/evaluation/table1.tsv",
+            category="Tables",
+            labels={"table": "table 1"},
+            caption="../report/table1.rst",
+        ),
+        picture=report(
+            R + "/evaluation/table1.png",
+            category="Tables",
+            labels={"table": "table 1, picture"},
+            caption="../report/table1.rst",
+        ),
+    log:
+        R + "/logs/measures.log",
+    benchmark:
+        R + "/benchmarks/measures.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=20,
+    params:
+        cfg=cfg_of("evaluation.measures"),
+        code=code_of("measures"),
+    script:
+        "../scripts/measures.py"

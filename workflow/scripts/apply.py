@@ -1,0 +1,75 @@
+"""Corrected meshes and the overlay of a chunk of a take."""
+
+import numpy as np
+
+from vermilion.config.apply import OverlayConfig
+from vermilion.correction.apply import correct_sequence
+from vermilion.draw import to_display
+from vermilion.evaluation.files import read_chunks
+from vermilion.export.shots import framing, overlay_frames
+from vermilion.faces.model import FaceModel
+from vermilion.frames import open_frames
+from vermilion.logfile import log_to
+from vermilion.progress import progress
+from vermilion.quality import QualityRow, write_quality
+from vermilion.regression.model import load_model
+from vermilion.sequences import read_sequence, write_sequence
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.video import write_video
+
+
+def quality_row(frame, tracked, has_features, figures):
+    """What a user should know of a frame."""
+    if not tracked:
+        return QualityRow(frame, False, "not tracked: the neighbours' pose, uncorrected", figures)
+    if not has_features:
+        return QualityRow(frame, False, "no contour features: the base track, uncorrected", figures)
+    return QualityRow(frame, True, "", figures)
+
+
+def main(snakemake):
+    inputs, params, out = snakemake.input, snakemake.params, snakemake.output
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
+    tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
+    identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
+    rows = fit.index_of(frames)
+    given = read_chunks([inputs.features], frames, ["features", "valid"])
+    features = np.where(given["valid"][:, None], given["features"], np.nan)
+    has_features, tracked = np.isfinite(features).all(axis=1), fit.valid[rows]
+    coarse = np.asarray(read_sequence(inputs.coarse), dtype=np.float64)
+    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
+    corrected = correct_sequence(
+        model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
+        features, valid=tracked, seam_mm=params.cfg["correction.integration"]["seam_mm"],
+    )  # fmt: skip
+    write_sequence(out.corrected, corrected)
+
+    novelty = np.full(len(frames), np.nan)
+    novelty[has_features] = model.novelty(features[has_features])
+    moved = np.linalg.norm(corrected - coarse, axis=2).max(axis=1)
+    rows_of_quality = [
+        quality_row(
+            int(frame), bool(tracked[i]), bool(has_features[i]),
+            {"novelty": novelty[i], "largest_correction_mm": moved[i]},
+        )
+        for i, frame in enumerate(frames)
+    ]  # fmt: skip
+    write_quality(out.quality, *place, "apply", rows_of_quality)
+
+    source, camera = open_frames(params.source, *place), fit.camera
+    view = framing(
+        tracker, identity.neutral_mm, *pose, fit.valid, camera, overlay.margin,
+        overlay.panel_height_px,
+    )  # fmt: skip
+    pictures = overlay_frames(
+        view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames, rows,
+        tracked, [("base track", coarse), (f"corrected, {model.name}", corrected)],
+        overlay.opacity, "/".join(place),
+    )  # fmt: skip
+    write_video(out.overlay, progress(pictures, "overlay", len(frames)), params.fps)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,65 @@
+"""H of a tattoo take against known truth, in the rig's world, without any alignment."""
+
+import numpy as np
+
+from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation.closest import Surface
+from vermilion.evaluation.files import frames_of, save_sums
+from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
+from vermilion.evaluation.measures import measure_rows
+from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
+from vermilion.evaluation.take import evaluate_reconstruction
+from vermilion.faces.model import FaceModel
+from vermilion.logfile import log_to
+from vermilion.mesh import vertex_normals
+from vermilion.sequences import read_sequence
+from vermilion.tables import write_table
+
+
+def main(snakemake):
+    wildcards, inputs, cfg = snakemake.wildcards, snakemake.input, snakemake.params.cfg
+    options = MeasuresConfig(**cfg["evaluation.measures"])
+    near = ReferenceConfig(**cfg["evaluation.reference"])
+    cosine = np.cos(np.radians(near.max_normal_angle_deg))
+    template, correspondence = (
+        FaceModel.load(inputs.template),
+        Correspondence.load(inputs.correspondence),
+    )
+    triangles, lips = template.triangles, lip_labels(template)
+    frames = frames_of(inputs.accurate)
+    sequence = np.asarray(read_sequence(inputs.accurate), dtype=np.float64)
+    finite = np.isfinite(sequence).all(axis=(1, 2))
+    frames, sequence = frames[finite], sequence[finite]
+    truth_triangles = np.load(inputs.truth[1])
+    truth = np.load(inputs.truth[0], mmap_mode="r")
+    neutral_truth = truth[0].astype(np.float64)
+    labels = transfer_lips(
+        sequence[0], triangles, lips, neutral_truth, truth_triangles, near.max_distance_mm, cosine
+    )
+    where = attach(
+        sequence[0], vertex_normals(sequence[0], triangles), lips,
+        Surface(neutral_truth, truth_triangles), labels, near.max_distance_mm, cosine,
+    )  # fmt: skip
+    reference = reference_of(
+        "truth", where, truth[frames - snakemake.params.first], truth_triangles
+    )
+    mouth = mask_on(
+        sequence[0], triangles, correspondence.on_coarse(sequence[0]),
+        correspondence.coarse_triangles[correspondence.mask],
+    )  # fmt: skip
+    regions = regions_of_mask(template, sequence[0], mouth)
+    slid = drift(sequence, triangles, reference, regions.used & reference.valid, cosine)
+    sums = evaluate_reconstruction(sequence, frames, regions, reference, slid, options.clip_frames, options.min_clips)
+    save_sums(snakemake.output.sums, sums, len(frames))
+    table = measure_rows(
+        sums, wildcards.subject, wildcards.take, len(frames),
+        options.bootstrap_samples, options.confidence, options.seed,
+    )  # fmt: skip
+    print(table.to_string())
+    write_table(snakemake.output.measures, table)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,27 @@
+"""All measures of all takes, the takes together, and table 1 of Lips16."""
+
+import pandas as pd
+
+from vermilion.config.evaluation import MeasuresConfig
+from vermilion.evaluation.figures import bars
+from vermilion.evaluation.files import load_sums
+from vermilion.evaluation.measures import COLUMNS
+from vermilion.evaluation.pooled import pooled_rows
+from vermilion.evaluation.table1 import table1
+from vermilion.logfile import log_to
+from vermilion.tables import read_table, write_table
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    options = MeasuresConfig(**snakemake.params.cfg["evaluation.measures"])
+    pooled = (options.bootstrap_samples, options.confidence, options.seed)
+    tables = [pd.DataFrame(columns=list(COLUMNS))]
+    for sums in (snakemake.input.takes, snakemake.input.reconstructions):
+        tables.append(pooled_rows([load_sums(path) for path in sums], *pooled))
+    tables += [read_table(path, COLUMNS) for path in snakemake.input.tables]
+    measures = pd.concat([table for table in tables if len(table)] or tables[:1], ignore_index=True)
+    write_table(snakemake.output.measures, measures)
+    summary = table1(measures)
+    write_table(snakemake.output.table1, summary)
+    bars(summary, snakemake.output.picture)
+    print(summary.to_string())
