@@ -109,9 +109,7 @@ def softened(layer: Layer, sigma_px: float) -> Layer:
     )
 
 
-def opened_by_darkness(
-    layer: Layer, linear: np.ndarray, darkest: float, reach_px: float
-) -> Layer:
+def opened_by_darkness(layer: Layer, linear: np.ndarray, darkest: float, reach_px: float) -> Layer:
     """The layer without pixels that are too dark to be lips, next to the mouth opening.
 
     The mesh misses the inner contour by a fraction of a millimetre; the dark gap between the lips
@@ -133,14 +131,30 @@ def opened_by_darkness(
     gap &= np.isin(part, np.unique(part[opening]))
     near = np.clip(1.5 - distance / max(reach_px, 1e-6), 0.0, 1.0)
     dark = np.clip(2.0 - grey / darkest, 0.0, 1.0) * np.maximum(near, gap & ~opening)
-    keep = blur(1.0 - np.pad(dark.astype(np.float32), 4), 0.5)[4:-4, 4:-4]
-    lost = layer.opacity * (1.0 - keep)
+    # The pattern shows through where the lens mixed it with the gap; its contour is smooth.
+    evidence = np.maximum(dark, layer.open).astype(np.float32)
+    along = cv2.filter2D(evidence, -1, _kernel_along(opening), borderType=cv2.BORDER_REPLICATE)
+    opened = np.clip(2.0 * (along - 0.5) + 0.6, 0.0, 1.0)
+    keep = np.clip((1.0 - opened) / np.maximum(1.0 - layer.open, 1e-3), 0.0, 1.0)
     return replace(
         layer,
         rgb=layer.rgb * keep[..., None],
         opacity=layer.opacity * keep,
-        open=np.minimum(layer.open + lost, 1.0),
+        open=np.minimum(layer.open + layer.opacity * (1.0 - keep), 1.0),
     )
+
+
+def _kernel_along(opening: np.ndarray, long_px: float = 2.0, short_px: float = 0.4) -> np.ndarray:
+    """An elongated Gaussian along the main axis of a mask."""
+    y, x = np.nonzero(opening)
+    axis = np.array([1.0, 0.0])
+    if len(x) > 10:
+        axis = np.linalg.eigh(np.cov(np.stack([x, y])))[1][:, -1]
+    offset = np.arange(-7, 8)
+    dx, dy = np.meshgrid(offset, offset)
+    u, v = dx * axis[0] + dy * axis[1], -dx * axis[1] + dy * axis[0]
+    kernel = np.exp(-0.5 * ((u / long_px) ** 2 + (v / short_px) ** 2))
+    return (kernel / kernel.sum()).astype(np.float32)
 
 
 def composite(linear: np.ndarray, layer: Layer, rim_px: float) -> np.ndarray:

@@ -9,7 +9,14 @@ import numpy as np
 from vermilion.camera import Camera
 from vermilion.images import linear_to_srgb
 from vermilion.inpaint.bake import Texture, bake
-from vermilion.inpaint.composite import Window, composite, opened_by_darkness, render_layer, softened, window_of
+from vermilion.inpaint.composite import (
+    Window,
+    composite,
+    opened_by_darkness,
+    render_layer,
+    softened,
+    window_of,
+)
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import luminance, weighted_blur
 from vermilion.inpaint.grain import add_grain, missing_grain
@@ -113,7 +120,9 @@ def paint_frame(
 def _darkest(paint: Paint) -> float:
     """Luminance that the painted lips hardly ever fall below, half of the darkest hundredth."""
     lips = paint.reference.seen & (paint.opacity > 0.99)
-    return 0.5 * float(np.percentile(luminance(paint.reference.rgb[lips]), 1)) if lips.any() else 0.0
+    return (
+        0.5 * float(np.percentile(luminance(paint.reference.rgb[lips]), 1)) if lips.any() else 0.0
+    )
 
 
 def _pixel_mm(camera: Camera, points_mm: np.ndarray) -> float:
