@@ -16,7 +16,7 @@ from vermilion.images import read_image, write_srgb8
 from vermilion.logfile import log_to
 
 
-def overlay(rig, manifest):
+def overlay(rig, manifest, neutral):
     """The worst board view of each camera, or the neutral in every camera."""
     if rig.calibration is not None:
         folder = Path(manifest.source) / "calibration"
@@ -29,7 +29,7 @@ def overlay(rig, manifest):
     source, pictures = open_frames(manifest.source, manifest.subject, manifest.take), {}
     for name in rig.cameras:
         try:
-            pictures[name] = source.read(name, snakemake.params.neutral)
+            pictures[name] = source.read(name, neutral)
         except InputError:
             pictures[name] = None
     return contact_sheet(pictures)
@@ -53,7 +53,7 @@ def main(snakemake):
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )
-    write_srgb8(snakemake.output.overlay, overlay(rig, manifests[0]))
+    write_srgb8(snakemake.output.overlay, overlay(rig, manifests[0], snakemake.params.neutral))
     with atomic_path(snakemake.output.summary) as temporary:
         temporary.write_text(json.dumps(rig.summary(), indent=1, sort_keys=True) + "\n")
     write_cameras(snakemake.output.cameras, rig.cameras)

@@ -1,0 +1,126 @@
+"""The inpaint stage on a tiny capture: its scripts from files to files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests import lip_patch
+from tests.stages.run_script import run_script
+from vermilion.camera import write_cameras
+from vermilion.draw import to_display
+from vermilion.images import read_image, write_image
+from vermilion.sequences import write_sequence
+from vermilion.tables import read_table
+
+POSES = [(0.0, 0.0), (3.0, 0.2), (6.0, 0.1)]
+CFG = {
+    "capture.frontal_camera": "front",
+    "inpaint.domain": {"texel_mm": 0.4, "skin_mm": 9.0, "inner_mm": 4.0},
+    "inpaint.mask": {},
+    "inpaint.shading": {},
+    "inpaint.composite": {"lens_px": 0.0},
+}
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory):
+    """A tattoo take of three frames and a plain take, with what multiview makes of them."""
+    root = tmp_path_factory.mktemp("inpaint")
+    model, rig = lip_patch.face_model(), lip_patch.cameras()
+    model.save(root / "template.npz")
+    write_cameras(root / "cameras", rig)
+    np.savez(root / "neutral.npz", vertices_mm=model.neutral_mm)
+    for name, camera in rig.items():
+        plain = lip_patch.render(model, model.neutral_mm, camera, tattoo=False)
+        write_image(root / f"plain/frames/{name}/000000.png", plain)
+    for frame, pose in enumerate(POSES):
+        for name, camera in rig.items():
+            if frame == 0 or name == "front":
+                picture = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=True)
+                write_image(root / f"rom/frames/{name}/{frame:06d}.png", picture)
+    run_script(
+        "inpaint_plain",
+        wildcards={"subject": "s1"},
+        params={"cfg": CFG, "take": "plain", "neutral": 0, "source": str(root / "plain")},
+        input={n: root / f for n, f in shared().items() if n != "plain"},
+        output={"texture": root / "plain.exr", "overlay": root / "plain.png"},
+    )
+    run_script(
+        "inpaint_reference",
+        wildcards={"subject": "s1", "take": "rom"},
+        params={"cfg": CFG, "neutral": 0, "source": str(root / "rom")},
+        input={n: root / f for n, f in shared().items()},
+        output={"reference": root / "reference.exr", "overlay": root / "reference.png"},
+    )
+    return root
+
+
+def shared() -> dict[str, str]:
+    return {
+        "template": "template.npz",
+        "cameras": "cameras",
+        "neutral": "neutral.npz",
+        "plain": "plain.exr",
+    }
+
+
+def paint(root, out, frames, meshes=None, source="rom"):
+    chunk = f"{frames[0]:06d}-{frames[-1]:06d}"
+    if meshes is None:
+        meshes = np.stack([lip_patch.vertices_at(*POSES[frame]) for frame in frames])
+    write_sequence(out / f"H/{chunk}.npy", meshes)
+    run_script(
+        "inpaint_frames",
+        wildcards={"subject": "s1", "take": "rom", "chunk": chunk},
+        params={"cfg": CFG, "frames": frames, "source": str(root / source)},
+        input={
+            **{n: root / f for n, f in shared().items()},
+            "reference": root / "reference.exr",
+            "meshes": out / f"H/{chunk}.npy",
+        },
+        output={
+            "frames": out / chunk,
+            "quality": out / f"quality/{chunk}.tsv",
+            "overlay": out / f"overlay/{chunk}.png",
+        },
+    )
+    return out / chunk
+
+
+def test_frames_come_out_without_their_tattoo(capture, tmp_path):
+    folder = paint(capture, tmp_path, [0, 1, 2])
+    model, camera = lip_patch.face_model(), lip_patch.cameras()["front"]
+    for frame, pose in enumerate(POSES):
+        truth = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=False)
+        inked = read_image(capture / f"rom/frames/front/{frame:06d}.png")
+        ours = read_image(folder / f"{frame:06d}.png")
+        before = np.abs(to_display(inked).astype(int) - to_display(truth)).mean()
+        after = np.abs(to_display(ours).astype(int) - to_display(truth)).mean()
+        assert after < 0.1 * before  # levels of 8 bit
+    rows = read_table(tmp_path / "quality/000000-000002.tsv")
+    assert rows["valid"].all() and (rows["composited_px"] > 1000).all()
+    assert (rows["border_levels8"] < 2.0).all()
+
+
+def test_chunks_change_no_bit(capture, tmp_path):
+    whole = paint(capture, tmp_path / "whole", [0, 1, 2])
+    parts = [paint(capture, tmp_path / "parts", frames) for frames in ([0], [1, 2])]
+    for part in parts:
+        for path in part.iterdir():
+            assert path.read_bytes() == (whole / path.name).read_bytes()
+
+
+def test_a_bad_frame_is_flagged_and_the_rest_goes_on(capture, tmp_path):
+    broken = capture / "broken/frames/front"
+    broken.mkdir(parents=True, exist_ok=True)
+    for frame in (0, 1, 2):
+        whole = (capture / f"rom/frames/front/{frame:06d}.png").read_bytes()
+        (broken / f"{frame:06d}.png").write_bytes(whole[: 900 if frame == 1 else None])
+    meshes = np.stack([lip_patch.vertices_at(*pose) for pose in POSES])
+    meshes[2] = np.nan
+    folder = paint(capture, tmp_path, [0, 1, 2], meshes, source="broken")
+    assert [path.name for path in folder.iterdir()] == ["000000.png"]
+    rows = read_table(tmp_path / "quality/000000-000002.tsv")
+    assert list(rows["valid"]) == [1, 0, 0]
+    assert "truncated" in rows["reason"][1] and "no mesh" in rows["reason"][2]
