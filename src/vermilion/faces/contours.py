@@ -15,6 +15,7 @@ from vermilion.mesh import unique_edges
 OUTER_LOOP = (58, 48, 49, 50, 51, 52, 62, 53, 54, 55, 56, 57)
 INNER_LOOP = (58, 59, 60, 61, 62, 63, 64, 65)
 RIGHT_CORNER, LEFT_CORNER = 58, 62
+UPPER_MIDDLE = 50
 
 
 def edge_graph(
@@ -109,24 +110,23 @@ def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int
 
 
 def lip_sides(
-    graph: sparse.spmatrix, outer: np.ndarray, inner: np.ndarray, corners: tuple[int, int]
+    graph: sparse.spmatrix, outer: np.ndarray, inner: np.ndarray, landmarks: np.ndarray
 ) -> np.ndarray:
     """Which vertices belong to the upper lip's side (True) and which to the lower's, (V,) bool.
 
-    Both loops start at the subject's right corner and run over the upper lip; `corners` are the
-    right and left corner of `outer`. A vertex belongs to the side whose contour is nearer.
+    A vertex belongs to the side whose part of the two contours is nearer along the edges; the
+    `landmarks` (66,) tell the parts, so that a loop may start anywhere and run either way.
     """
+    ends = landmarks[[RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE]]
+    distance = csgraph.dijkstra(graph, indices=ends)
     upper, lower = [], []
     for loop in (outer, inner):
-        turn = _turning_point(graph, loop, corners[1])
-        upper.append(loop[1:turn])
-        lower.append(loop[turn + 1 :])
+        start, turn, middle = (int(np.argmin(row[loop])) for row in distance)
+        loop = np.roll(loop, -start)
+        turn, middle = (turn - start) % len(loop), (middle - start) % len(loop)
+        first, second = loop[1:turn], loop[turn + 1 :]
+        upper.append(first if middle < turn else second)
+        lower.append(second if middle < turn else first)
     to_upper = geodesic_distance(graph, np.concatenate(upper))
     to_lower = geodesic_distance(graph, np.concatenate(lower))
     return to_upper <= to_lower
-
-
-def _turning_point(graph: sparse.spmatrix, loop: np.ndarray, corner: int) -> int:
-    """Index in the loop of the vertex nearest to the left corner."""
-    distance = csgraph.dijkstra(graph, indices=corner)
-    return int(np.argmin(distance[loop]))

@@ -16,8 +16,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.faces.contours import (
-    LEFT_CORNER,
-    RIGHT_CORNER,
     edge_graph,
     enclosed,
     geodesic_distance,
@@ -170,8 +168,7 @@ def _regions(
     past_meeting = enclosed(skin, n_vertices, inner, socket)
     depth = geodesic_distance(graph, inner)
     vermilion = lips_and_inside & ~(past_meeting & (depth > VERMILION_INSIDE_MM))
-    corners = (landmarks[RIGHT_CORNER], landmarks[LEFT_CORNER])
-    upper = lip_sides(graph, outer, inner, corners)
+    upper = lip_sides(graph, outer, inner, landmarks)
     mouth_inner = past_meeting & ~vermilion
     mouth_inner[GUMS] = True
     index = np.arange(n_vertices)

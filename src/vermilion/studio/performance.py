@@ -36,7 +36,9 @@ MOUTH_POSES: tuple[dict[str, float], ...] = (
     {"mouthSmile_L": 0.8, "mouthUpperUp_L": 0.3},
     {"mouthSmile_R": 0.8, "mouthUpperUp_R": 0.3},
 )
-UPPER_FACE = (
+UPPER_FACE = (  # pairs; a shape without sides stands twice
+    "browInnerUp",
+    "browInnerUp",
     "browInnerUp_L",
     "browInnerUp_R",
     "browDown_L",

@@ -10,8 +10,6 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from vermilion.faces.contours import (
-    LEFT_CORNER,
-    RIGHT_CORNER,
     edge_graph,
     enclosed,
     geodesic_distance,
@@ -56,8 +54,7 @@ def surface_of(model: FaceModel) -> Surface:
     graph = edge_graph(model.neutral_mm, skin)
     lip = _lip_distance(model, skin, graph)
     inside = _inside_distance(model, skin, graph)
-    corners = (model.landmarks[RIGHT_CORNER], model.landmarks[LEFT_CORNER])
-    upper = lip_sides(graph, model.outer_contour, model.inner_contour, corners)
+    upper = lip_sides(graph, model.outer_contour, model.inner_contour, model.landmarks)
     brows = model.neutral_mm[model.landmarks[17:27], :2].reshape(2, 5, 2)
     return Surface(
         solid_mm=_solid(model, label).astype(np.float32),
