@@ -54,7 +54,7 @@ class FaceModelConfig(StageConfig):
         description="Vertex spacing at the lips of the procedural template (mm).",
     )
     tracker_triangles: int = Field(
-        6000, ge=1500, le=20000, description="Target triangle count of the tracker's mesh."
+        6000, ge=2000, le=20000, description="Target triangle count of the tracker's mesh."
     )
     studio_identities: int = Field(
         10, ge=0, le=100, description="Identity modes of the studio and the template."

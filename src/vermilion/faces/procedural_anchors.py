@@ -28,12 +28,15 @@ def anchor_chart() -> dict[int, complex]:
     return dict(enumerate(points))
 
 
-def snap(chart: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, dict[int, int]]:
-    """Move the nearest free chart points onto the anchors.
+def snap(
+    chart: np.ndarray, free: np.ndarray, yielding: np.ndarray
+) -> tuple[np.ndarray, dict[int, int]]:
+    """Move the nearest free chart points onto the anchors, and their neighbours a little.
 
     Args:
         chart: (N,) complex.
-        free: (N,) bool, points that may move.
+        free: (N,) bool, points that may become an anchor.
+        yielding: (N,) bool, points that may give way to a neighbour that became one.
 
     Returns:
         (moved chart (N,), landmark number -> point id).
@@ -41,6 +44,11 @@ def snap(chart: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, dict[int, int
     moved, free, ids = chart.copy(), free.copy(), {}
     for landmark, target in anchor_chart().items():
         candidates = np.flatnonzero(free)
-        nearest = int(candidates[np.argmin(np.abs(chart[candidates] - target))])
+        apart = np.abs(moved[candidates] - target)
+        nearest = int(candidates[np.argmin(apart)])
+        reach = 3.0 * apart.min() + 1e-9
+        around = candidates[(apart < 3.0 * reach) & yielding[candidates]]
+        give = np.exp(-((np.abs(moved[around] - moved[nearest]) / reach) ** 2))
+        moved[around] += give * (target - moved[nearest])
         moved[nearest], free[nearest], ids[landmark] = target, False, nearest
     return moved, ids

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 
 from vermilion.faces.procedural_anchors import snap
 from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_scale_mm, locate
@@ -53,7 +53,7 @@ class Layout:
     def spacing_at(self, distance_mm: float) -> float:
         """Wanted spacing (mm) at a distance from the border: fine on the face, coarse behind."""
         distances = [0.0, 4.0, 10.0, 25.0, 60.0, 105.0, 180.0, 400.0]
-        factors = [1.0, 1.15, 1.7, 2.3, 3.2, 5.0, 13.0, 30.0]
+        factors = [1.0, 1.15, 1.7, 2.3, 3.0, 4.8, 13.0, 30.0]
         factor = float(np.interp(distance_mm, distances, factors))
         return self.spacing_mm * (1.0 + (factor - 1.0) * self.coarsening)
 
@@ -112,7 +112,7 @@ def eye_rings(layout: Layout) -> tuple[np.ndarray, list[np.ndarray]]:
     phase = np.arange(count) * (2 * np.pi / count)
     centre = EYE_CENTRE_MM[:2] + np.array([0.3, 0.6])
     rings, distance = [locate(lid_margin_xy(phase))], 0.0
-    while distance < 12.0:
+    while distance < 15.5:
         distance += 0.9 * spacing * (1.0 + 0.07 * distance)
         circle = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
         share = 1.0 - np.exp(-distance / 22.0)
@@ -157,15 +157,34 @@ def skin_sheet(layout: Layout) -> SkinSheet:
         charts.extend(eye)
         at += sum(len(ring) for ring in eye)
     chart = np.concatenate([*charts, outer])
-    free = np.ones(len(chart), dtype=bool)
-    free[: len(strips)] = False
-    free[np.concatenate(eyes)] = False
-    free[at : at + n] = False  # the ring that meets the strips
-    chart, anchors = snap(chart, free)
+    chart, anchors = snap(chart, *_loose_points(chart, len(strips), n, at, eyes, left))
     aligned = np.arange(len(strips)).reshape(-1, n)
     around = _triangulate(chart, layout.n_strips * n, [aligned[-1], *eyes])
     triangles = np.concatenate([strip_triangles(list(aligned[::-1])), around])
     return SkinSheet(chart, triangles.astype(np.int32), tuple(eyes), phase, anchors)
+
+
+def _loose_points(
+    chart: np.ndarray, n_strip: int, n_ring: int, n_inner: int, eyes: list, left: list
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which points may become anchors, and which may give way: none that edges holes."""
+    free = np.ones(len(chart), dtype=bool)
+    free[:n_strip] = False
+    free[np.concatenate(eyes)] = False
+    free[n_inner : n_inner + n_ring] = False  # the ring that meets the strips
+    yielding = free.copy()
+    per_eye = sum(len(ring) for ring in left)
+    kept = 4 * len(left[0])  # the four rings next to a lid
+    for k in range(2):
+        yielding[n_strip + k * per_eye : n_strip + k * per_eye + kept] = False
+    last_strip = chart[n_strip - n_ring : n_strip]
+    spacing = np.abs(np.diff(last_strip)).max()
+    gap, _ = cKDTree(_plane(last_strip)).query(_plane(chart))
+    return free, yielding & (gap > 3.0 * spacing)
+
+
+def _plane(chart: np.ndarray) -> np.ndarray:
+    return np.stack([chart.real, chart.imag], axis=-1)
 
 
 def _near_eyes(chart: np.ndarray, left: list[np.ndarray]) -> np.ndarray:
@@ -184,7 +203,7 @@ def _near_eyes(chart: np.ndarray, left: list[np.ndarray]) -> np.ndarray:
 
 def _triangulate(chart: np.ndarray, first: int, holes: list[np.ndarray]) -> np.ndarray:
     """Delaunay triangles of the chart points from id `first` on, without those inside the holes."""
-    points = np.stack([chart.real, chart.imag], axis=-1)
+    points = _plane(chart)
     triangles = Delaunay(points[first:]).simplices + first
     for loop in holes:
         triangles = triangles[~_within(points, triangles, loop)]
