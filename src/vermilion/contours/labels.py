@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vermilion.contours.paths import cheapest_path
 from vermilion.errors import InputError
 
 CONTOURS = ("inner", "outer")
@@ -81,24 +82,51 @@ def distance_to(points_px: np.ndarray, size: int) -> np.ndarray:
     return distance.reshape(size, size)
 
 
-def contact_lines(label: ContourLabel) -> list[np.ndarray]:
+def contact_lines(label: ContourLabel, across: np.ndarray) -> list[np.ndarray]:
     """Where lips touch beside a part-open mouth, from each end of the inner contour to its corner.
 
-    A label names the opening only; whether the line of contact is inner contour is undecided, so
-    training leaves it out. Segments (2, 2) in image pixels.
+    `across` (2,) is the direction of the eyes' line in the image. A label names the opening only.
+    Segments (2, 2) in image pixels; the line of contact runs
+    near them, see `dark_valley`.
     """
     outer, inner = label.outer.points_px, label.inner.points_px
-    axis = _mouth_axis(outer)
     lines = []
     for sign in (-1.0, 1.0):
-        ends = [points[np.argmax(sign * (points @ axis))] for points in (inner, outer)]
+        ends = [points[np.argmax(sign * (points @ across))] for points in (inner, outer)]
         lines.append(np.stack(ends))
     return lines
 
 
-def _mouth_axis(outer_px: np.ndarray) -> np.ndarray:
-    hull = cv2.convexHull(outer_px.astype(np.float32))[:, 0].astype(np.float64)
-    apart = hull[:, None] - hull[None]
-    i, j = np.unravel_index(np.argmax((apart**2).sum(axis=-1)), apart.shape[:2])
-    axis = hull[i] - hull[j]
-    return axis / np.linalg.norm(axis)
+def dark_valley(
+    lightness: np.ndarray,
+    start: np.ndarray,
+    end: np.ndarray,
+    reach_px: float,
+    least_contrast: float = 0.015,
+) -> np.ndarray:
+    """The darkest smooth line between two points of a picture (h, w), (n, 2) pixels.
+
+    It leaves the straight line by at most `reach_px`, and starts at `start`: lips in contact show
+    a dark line from the mouth's opening towards its corner. It ends where it is no darker than
+    what lies on either side, so it may be empty (0, 2).
+    """
+    length = float(np.linalg.norm(end - start))
+    if length < 2.0:
+        return np.zeros((0, 2))
+    along = (end - start) / length
+    across = np.array([-along[1], along[0]])
+    steps = np.arange(0.0, length + 1e-9, 0.5)
+    offsets = np.arange(-reach_px, reach_px + 1e-9, 0.5)
+    places = start + steps[:, None, None] * along + offsets[None, :, None] * across
+    smooth = cv2.GaussianBlur(lightness.astype(np.float32), (0, 0), 1.0)
+    x, y = (np.ascontiguousarray(places[..., k] - 0.5, dtype=np.float32) for k in range(2))
+    lit = cv2.remap(smooth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    cost = lit.astype(np.float64) / max(float(np.ptp(lit)), 1e-6)
+    cost[0] += np.abs(offsets)  # it starts at the opening
+    columns = cheapest_path(cost, np.full(len(steps), 0.1))
+    rows, aside = np.arange(len(steps)), round(0.6 * reach_px / 0.5)
+    brighter = [lit[rows, np.clip(columns + sign * aside, 0, len(offsets) - 1)] for sign in (-1, 1)]
+    contrast = np.minimum(*brighter) - lit[rows, columns]
+    contrast = cv2.blur(contrast.astype(np.float32)[:, None], (1, 9)).ravel()
+    flat = np.flatnonzero(contrast < least_contrast)
+    return places[rows, columns][: flat[0] if len(flat) else None]

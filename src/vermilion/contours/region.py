@@ -50,16 +50,28 @@ class MouthRegion:
 
     def crop(self, picture: np.ndarray) -> np.ndarray:
         """The region of a picture (h, w, channels), (size, size, channels); edges repeat."""
-        source = np.ascontiguousarray(picture, dtype=np.float32)
+        affine = self.image_from_region.copy()
+        low, high = self._window(picture.shape)
+        affine[:, 2] -= low
+        source = np.ascontiguousarray(picture[low[1] : high[1], low[0] : high[0]], dtype=np.float32)
         if self.scale > 1.0:  # the picture has more detail than the region can hold
             source = cv2.GaussianBlur(source, (0, 0), 0.5 * np.sqrt(self.scale**2 - 0.75))
         return cv2.warpAffine(
             source,
-            centred(self.image_from_region),
+            centred(affine),
             (self.size_px, self.size_px),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_REPLICATE,
         )
+
+    def _window(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and past-the-end pixel (x, y) of the part of a picture that the region needs."""
+        corners = self.to_image(np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * self.size_px)
+        margin = 2 + 3 * self.scale
+        limit = np.array([shape[1], shape[0]])
+        low = np.clip(np.floor(corners.min(axis=0) - margin).astype(int), 0, limit - 1)
+        high = np.clip(np.ceil(corners.max(axis=0) + margin).astype(int), low + 1, limit)
+        return low, high
 
     def paste(self, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
         """Values (size, size) of the region in a picture of `shape`, zero elsewhere."""

@@ -21,7 +21,9 @@ from vermilion.contours.detector import BoostedDetector
 from vermilion.contours.labels import (
     CONTOURS,
     ContourLabel,
+    Polyline,
     contact_lines,
+    dark_valley,
     distance_to,
     label_paths,
     read_label,
@@ -188,15 +190,40 @@ def _examples(
             name: distance_to(apply_affine(inverse, line), region.size_px)
             for name, line in lines.items()
         }
+        picture = region.crop(frame.linear_rgb)
+        channels = image_channels(picture)
         usable = {name: region.mask.copy() for name in CONTOURS}
-        contact = np.zeros(region.mask.shape, dtype=np.uint8)
-        for segment in contact_lines(frame.label):
-            start, end = np.rint(apply_affine(inverse, segment)).astype(int).tolist()
-            cv2.line(contact, start, end, 1, thickness=round(0.06 * settings.interocular_size_px))
-        usable["inner"] &= (contact == 0) | (distance["inner"] < 2.0)
-        integrals = integral_images(image_channels(region.crop(frame.linear_rgb)))
-        examples.append(_Example(integrals, distance, usable))
+        across = region.image_from_region[:, 0]
+        segments = [apply_affine(inverse, line) for line in contact_lines(frame.label, across)]
+        _add_contact(distance["inner"], usable["inner"], channels[0], segments, settings)
+        examples.append(_Example(integral_images(channels), distance, usable))
     return examples
+
+
+def _add_contact(
+    distance: np.ndarray,
+    usable: np.ndarray,
+    lightness: np.ndarray,
+    segments: Sequence[np.ndarray],
+    settings: TrainingSettings,
+) -> None:
+    """Let the lips' line of contact count as inner contour, in place.
+
+    A label names the opening alone, while a closed mouth's label is its line of contact. So the
+    dark line from each end of the opening is taken as contour too, and what lies between the
+    line and the surely different is left out.
+    """
+    reach = 0.03 * settings.interocular_size_px
+    for start, end in segments:
+        if np.linalg.norm(end - start) < 2 * reach:
+            continue
+        towards = end - 0.1 * (end - start)  # the corner itself is outer contour
+        line = dark_valley(lightness, start, towards, reach)
+        near = distance_to(Polyline(np.stack([start, end]), False).dense(), len(distance)) < reach
+        contact = distance_to(line, len(distance)) if len(line) else np.full_like(distance, np.inf)
+        certain = np.minimum(distance, contact) < 1.5 * settings.label_px
+        usable &= certain | ~near
+        np.minimum(distance, contact, out=distance)
 
 
 def _jitter(random: np.random.Generator, mirrored: bool) -> np.ndarray:

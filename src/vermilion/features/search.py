@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vermilion.contours.paths import cheapest_ring
+
 
 @dataclass(frozen=True)
 class SearchSettings:
@@ -99,7 +101,7 @@ def find_outer(
     profile = sample(likelihood, ring_px[:, None] + places[:, None] * unit_px * normals[:, None])
     cost = -np.log(profile + settings.floor)
     cost += settings.model_weight * (places / settings.inward) ** 2
-    chosen = _ring_path(cost, _smoothness(ring_px, unit_px, settings))
+    chosen = cheapest_ring(cost, _smoothness(ring_px, unit_px, settings))
     return _refined(profile, places, chosen, ring_px, normals, unit_px, settings)
 
 
@@ -133,7 +135,7 @@ def find_inner(
     before = np.pad(before, ((0, 0), (ridge, 0)))[:, : len(places)]
     cost = -np.log(profile + settings.floor) + before
     cost += settings.model_weight * ((places - expected[:, None]) / settings.inward) ** 2
-    chosen = _ring_path(cost, _smoothness(outer_px, unit_px, settings))
+    chosen = cheapest_ring(cost, _smoothness(outer_px, unit_px, settings))
     return _refined(profile, places, chosen, outer_px, normals, unit_px, settings)
 
 
@@ -158,39 +160,6 @@ def _smoothness(ring_px: np.ndarray, unit_px: float, settings: SearchSettings) -
     return settings.smooth_weight * (settings.step / np.maximum(apart, settings.step)) ** 2
 
 
-def _ring_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
-    """Cheapest closed path through (n, m) costs, (n,) columns.
-
-    Solved twice: freely, then with the ends tied at the sample farthest from where it was free.
-    """
-    n = len(cost)
-    free = _open_path(cost, smoothness)
-    start = n // 2
-    tied = np.roll(cost, -start, axis=0)
-    tied = np.concatenate([tied, tied[:1]])
-    for row in (0, n):
-        tied[row] = np.inf
-        tied[row, free[start]] = cost[start, free[start]]
-    path = _open_path(tied, np.roll(smoothness, -start))
-    return np.roll(path[:n], start)
-
-
-def _open_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
-    n, m = cost.shape
-    apart = (np.arange(m)[:, None] - np.arange(m)[None]).astype(np.float64) ** 2
-    total = cost[0]
-    origin = np.zeros((n, m), dtype=np.int64)
-    for row in range(1, n):
-        through = total[None] + smoothness[row - 1] * apart
-        origin[row] = through.argmin(axis=1)
-        total = cost[row] + through[np.arange(m), origin[row]]
-    path = np.empty(n, dtype=np.int64)
-    path[-1] = int(np.argmin(total))
-    for row in range(n - 1, 0, -1):
-        path[row - 1] = origin[row, path[row]]
-    return path
-
-
 def _refined(
     profile: np.ndarray,
     places: np.ndarray,
@@ -200,10 +169,11 @@ def _refined(
     unit_px: float,
     settings: SearchSettings,
 ) -> FoundRing:
-    """Move each choice to the maximum within two steps, to a fraction of a step."""
+    """Move each choice to the nearest maximum within the ridge, to a fraction of a step."""
     n, m = profile.shape
     rows = np.arange(n)
-    near = np.clip(chosen[:, None] + np.arange(-2, 3), 1, m - 2)
+    reach = max(round(0.0075 / settings.step), 1)
+    near = np.clip(chosen[:, None] + np.arange(-reach, reach + 1), 1, m - 2)
     best = near[rows, profile[rows[:, None], near].argmax(axis=1)]
     left, top, right = (profile[rows, best + k] for k in (-1, 0, 1))
     maximum = (top >= left) & (top >= right) & (top >= settings.least_likelihood)

@@ -1,0 +1,45 @@
+"""Cheapest smooth paths through a table of costs, by dynamic programming."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def cheapest_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
+    """Columns (n,) of the path through (n, m) costs that is cheapest in all.
+
+    Args:
+        cost: (n, m); infinite where the path must not go.
+        smoothness: (n,) cost of one column's step, squared, between row k and the next.
+    """
+    n, m = cost.shape
+    apart = (np.arange(m)[:, None] - np.arange(m)[None]).astype(np.float64) ** 2
+    total = cost[0]
+    origin = np.zeros((n, m), dtype=np.int64)
+    for row in range(1, n):
+        through = total[None] + smoothness[row - 1] * apart
+        origin[row] = through.argmin(axis=1)
+        total = cost[row] + through[np.arange(m), origin[row]]
+    path = np.empty(n, dtype=np.int64)
+    path[-1] = int(np.argmin(total))
+    for row in range(n - 1, 0, -1):
+        path[row - 1] = origin[row, path[row]]
+    return path
+
+
+def cheapest_ring(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
+    """The same for a closed path: the last row is beside the first.
+
+    Solved twice: freely, then with both ends tied in the middle of the free solution, where its
+    own ends have no say.
+    """
+    n = len(cost)
+    free = cheapest_path(cost, smoothness)
+    start = n // 2
+    tied = np.roll(cost, -start, axis=0)
+    tied = np.concatenate([tied, tied[:1]])
+    for row in (0, n):
+        tied[row] = np.inf
+        tied[row, free[start]] = cost[start, free[start]]
+    path = cheapest_path(tied, np.append(np.roll(smoothness, -start), 0.0))
+    return np.roll(path[:n], start)
