@@ -1,0 +1,56 @@
+"""The banded box-constrained solver against dense solvers."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from vermilion.tracking.band import BandMatrix, solve_in_box
+
+
+def dense(blocks, second, first):
+    n, p = blocks.shape[:2]
+    matrix = np.zeros((n * p, n * p))
+    for f in range(n):
+        matrix[f * p : f * p + p, f * p : f * p + p] = blocks[f]
+    for weights, stencil in ((first, [-1, 1]), (second, [1, -2, 1])):
+        for f in range(len(weights)):
+            for k in range(p):
+                row = np.zeros(n * p)
+                row[[(f + i) * p + k for i in range(len(stencil))]] = stencil
+                matrix += weights[f, k] * np.outer(row, row)
+    return matrix
+
+
+def problem(n, p=3, seed=0):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, p, p))
+    blocks = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(p)
+    second, first = rng.uniform(0, 2, (max(n - 2, 0), p)), rng.uniform(0, 2, (max(n - 1, 0), p))
+    return BandMatrix(blocks, second, first), dense(blocks, second, first), rng.normal(size=(n, p))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7])
+def test_products_and_solutions_equal_the_dense_ones(n):
+    matrix, full, right = problem(n)
+    assert np.allclose(matrix.times(right).reshape(-1), full @ right.reshape(-1), atol=1e-12)
+    solution = matrix.solve_free(right, np.ones(right.shape, dtype=bool))
+    assert np.allclose(full @ solution.reshape(-1), right.reshape(-1), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_box_holds_and_the_minimum_is_scipys(seed):
+    matrix, full, right = problem(6, seed=seed)
+    right *= 5
+    found = solve_in_box(matrix, right, 0.0, 0.4)
+    root = np.linalg.cholesky(full).T
+    wanted = lsq_linear(
+        root, np.linalg.solve(root.T, right.reshape(-1)), (0.0, 0.4), tol=1e-14
+    ).x.reshape(right.shape)
+    assert found.min() >= 0 and found.max() <= 0.4
+    assert np.allclose(found, wanted, atol=1e-5)
+
+
+def test_an_infinite_box_is_no_box():
+    matrix, full, right = problem(5)
+    found = solve_in_box(matrix, right, -np.inf, np.inf)
+    assert np.allclose(full @ found.reshape(-1), right.reshape(-1), atol=1e-8)
