@@ -120,6 +120,15 @@ def main(snakemake):
     )  # fmt: skip
 
     sums = dict(result.sums)
+    contours = read_chunks(inputs.features, frames, ["outer_px", "inner_px"])
+    eyes = fit.camera.project(take.coarse_mm[:, tracker.landmarks[[36, 45]]])
+    for name, sequence in sequences.items():
+        distance = contour_error(
+            sequence, fit.camera, [tracker.outer_contour, tracker.inner_contour],
+            [contours["outer_px"], contours["inner_px"]],
+            np.linalg.norm(eyes[:, 0] - eyes[:, 1], axis=1),
+        )  # fmt: skip
+        sums[name] += sums_of_frames("mouth.contour", distance, result.clips)
     for name, model in regressed.items():
         each = np.full(len(frames), seconds[name])
         sums[name] += sums_of_frames("mouth.seconds", each, result.clips)

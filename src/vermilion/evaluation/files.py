@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,26 +10,6 @@ import numpy as np
 from vermilion.errors import InputError
 from vermilion.evaluation.errors import ClipSums
 from vermilion.files import atomic_path
-
-
-@dataclass(frozen=True)
-class ErrorMaps:
-    """Meshes and errors of the frames that the report shows.
-
-    Attributes:
-        frames: (n,) frame numbers.
-        regressors: (R,) str.
-        meshes_mm: (R, n, V, 3) float32, head frame.
-        errors_mm: (R, n, V) float32; NaN where not measured.
-        triangles: (T, 3); mouth: (V,) bool.
-    """
-
-    frames: np.ndarray
-    regressors: np.ndarray
-    meshes_mm: np.ndarray
-    errors_mm: np.ndarray
-    triangles: np.ndarray
-    mouth: np.ndarray
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:

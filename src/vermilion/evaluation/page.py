@@ -1,0 +1,140 @@
+"""Pieces of a self-contained HTML page."""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import pandas as pd
+
+_LARGE_BYTES = 300_000
+_STYLE = """
+:root { --ink: #23211f; --soft: #6d6761; --line: #e4dfd9; --accent: #a63d2f; --paper: #fffdfb; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--paper); color: var(--ink);
+  font: 16px/1.55 system-ui, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
+main { max-width: 1080px; margin: 0 auto; padding: 36px 24px 96px; }
+h1 { font-size: 30px; margin: 0 0 4px; } h1 + p { color: var(--soft); margin: 0 0 24px; }
+h2 { font-size: 21px; margin: 52px 0 10px; padding-top: 14px; border-top: 1px solid var(--line); }
+h3 { font-size: 16px; margin: 26px 0 6px; }
+p { max-width: 74ch; } a { color: var(--accent); }
+nav { font-size: 14px; color: var(--soft); } nav a { margin-right: 14px; white-space: nowrap; }
+table { border-collapse: collapse; font-size: 14px; margin: 10px 0 18px; }
+th, td { padding: 4px 14px 4px 0; text-align: left; border-bottom: 1px solid var(--line);
+  vertical-align: top; }
+th { color: var(--soft); font-weight: 600; white-space: nowrap; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
+tr.group td { border-top: 2px solid var(--line); }
+.scroll { overflow-x: auto; }
+figure { margin: 14px 0 26px; } figure img, video { max-width: 100%; height: auto; display: block; }
+figcaption { color: var(--soft); font-size: 14px; margin-top: 6px; max-width: 74ch; }
+.figures { display: flex; flex-wrap: wrap; gap: 12px; margin: 14px 0 22px; }
+.figures div { flex: 1 1 190px; border: 1px solid var(--line); border-radius: 6px; padding: 12px 16px;
+  background: #fff; }
+.figures b { font-size: 24px; display: block; } .figures span { color: var(--soft); font-size: 13px; }
+details { margin: 8px 0; } summary { cursor: pointer; color: var(--accent); }
+code { font: 13px/1.5 ui-monospace, Menlo, Consolas, monospace; background: #f5f1ec; padding: 1px 4px; }
+.none { color: var(--soft); }
+"""
+
+
+def page(title: str, lead: str, sections: Sequence[tuple[str, str]]) -> str:
+    """A whole page. `sections` are (heading, HTML body) pairs; empty bodies are left out."""
+    kept = [(heading, body) for heading, body in sections if body]
+    links = " ".join(f'<a href="#{slug(h)}">{text(h)}</a>' for h, _ in kept)
+    bodies = "\n".join(f'<h2 id="{slug(h)}">{text(h)}</h2>\n{body}' for h, body in kept)
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{text(title)}</title><style>{_STYLE}</style></head><body><main>\n"
+        f"<h1>{text(title)}</h1><p>{text(lead)}</p>\n<nav>{links}</nav>\n{bodies}\n"
+        "</main></body></html>\n"
+    )
+
+
+def text(value: object) -> str:
+    """Escaped text."""
+    return html.escape(str(value))
+
+
+def slug(heading: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in heading.lower())
+
+
+def number(value: object, digits: int = 2) -> str:
+    """A number as people read it; nothing for NaN."""
+    if isinstance(value, float):
+        if math.isnan(value):
+            return ""
+        if value != 0 and abs(value) < 10**-digits:
+            return f"{value:.2g}"
+        return f"{value:.{digits}f}"
+    return text(value)
+
+
+def table(rows: pd.DataFrame, headings: dict[str, str], group: str | None = None) -> str:
+    """Columns of a table under other headings; a line above each new value of column `group`."""
+    numeric = {c for c in headings if pd.api.types.is_numeric_dtype(rows[c])}
+
+    def cell(tag: str, column: str, content: str) -> str:
+        kind = ' class="n"' if column in numeric else ""
+        return f"<{tag}{kind}>{content}</{tag}>"
+
+    lines = ["".join(cell("th", c, text(h)) for c, h in headings.items())]
+    previous = None
+    body = []
+    for _, row in rows.iterrows():
+        new = group is not None and row[group] != previous
+        previous = row[group] if group is not None else None
+        cells = "".join(cell("td", c, "" if row[c] is None else number(row[c])) for c in headings)
+        body.append(f"<tr{' class=group' if new else ''}>{cells}</tr>")
+    return (
+        f'<div class="scroll"><table><thead><tr>{lines[0]}</tr></thead>'
+        f"<tbody>{''.join(body)}</tbody></table></div>"
+    )
+
+
+def figures(items: Sequence[tuple[str, str]]) -> str:
+    """A row of large figures: (figure, what it is) pairs."""
+    boxes = "".join(f"<div><b>{text(f)}</b><span>{text(w)}</span></div>" for f, w in items)
+    return f'<div class="figures">{boxes}</div>' if items else ""
+
+
+def picture(path: str | Path, caption: str, width_px: int = 1400) -> str:
+    """A PNG or JPEG, embedded; large ones as JPEG of at most `width_px`."""
+    path = Path(path)
+    kind, content = "png", path.read_bytes()
+    if len(content) > _LARGE_BYTES:
+        pixels = cv2.imread(str(path))
+        if pixels.shape[1] > width_px:
+            height = round(pixels.shape[0] * width_px / pixels.shape[1])
+            pixels = cv2.resize(pixels, (width_px, height), interpolation=cv2.INTER_AREA)
+        kind = "jpeg"
+        content = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 84])[1].tobytes()
+    encoded = base64.b64encode(content).decode("ascii")
+    return (
+        f'<figure><img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'
+        f"<figcaption>{text(caption)}</figcaption></figure>"
+    )
+
+
+def video(path: str | Path, caption: str, limit_mb: float) -> str:
+    """An MP4, embedded up to `limit_mb`, else named."""
+    path = Path(path)
+    if path.stat().st_size > limit_mb * 1e6:
+        size = path.stat().st_size / 1e6
+        return f"<p>{text(caption)}: <code>{text(path)}</code> ({size:.0f} MB, not embedded).</p>"
+    encoded = base64.b64encode(path.read_bytes()).decode("ascii")
+    return (
+        f'<figure><video controls loop muted src="data:video/mp4;base64,{encoded}"></video>'
+        f"<figcaption>{text(caption)}</figcaption></figure>"
+    )
+
+
+def folded(summary: str, body: str) -> str:
+    """A part that opens on a click."""
+    return f"<details><summary>{text(summary)}</summary>{body}</details>"

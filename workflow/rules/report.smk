@@ -1,0 +1,145 @@
+"""Flagged frames of all stages (quality.tsv) and the results on one page (evaluation/summary.html)."""
+
+
+def used_takes(role=None):
+    """Takes that the database, the evaluation or the application needs."""
+    wanted = {take.name for take in database_takes() + evaluated_takes()}
+    wanted |= set(CONFIG.apply.takes)
+    people = {name.split("/")[0] for name in wanted}
+    wanted |= {take.name for take in takes("plain") if take.subject in people}
+    return [take for take in takes(role) if take.name in wanted]
+
+
+#: Folder of a stage's quality rows and overlays within a take -> the roles that have it.
+STAGE_FOLDERS = {
+    "capture": ("tattoo", "plain", "video"),
+    "multiview": ("tattoo",),
+    "inpaint": ("tattoo",),
+    "landmarks": ("tattoo", "video"),
+    "tracking": ("tattoo", "video"),
+    "contours": ("tattoo", "video"),
+    "correction/features": ("tattoo", "video", "tracked"),
+    "correction": ("tattoo",),
+}
+
+
+def quality_files():
+    """Quality tables of every stage that ran."""
+    paths = [
+        path
+        for folder, roles in STAGE_FOLDERS.items()
+        for take in used_takes(roles)
+        for path in expand_chunks(
+            R + "/takes/{subject}/{take}/" + folder + "/quality/{chunk}.tsv",
+            take.subject,
+            take.take,
+        )
+    ]
+    people = subjects("tattoo")
+    paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
+    paths += of_takes(EVALUATED + "/quality.tsv", evaluated_takes())
+    for name in CONFIG.apply.takes:
+        paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))
+    return paths
+
+
+def stage_overlays():
+    """[stage, what, file] of the pictures that the page shows: the first chunk of every take."""
+    rows = [["correspondence", s, f"{R}/subjects/{s}/correspondence/overlay/neutral.png"]
+            for s in subjects("tattoo")]  # fmt: skip
+    for folder, roles in STAGE_FOLDERS.items():
+        for take in used_takes(roles):
+            pattern = R + "/takes/{subject}/{take}/" + folder + "/overlay/{chunk}.png"
+            path = expand_chunks(pattern, take.subject, take.take)[0]
+            rows.append([folder.split("/")[-1], take.name, path])
+    for take in used_takes(("tattoo", "plain")):
+        path = f"{R}/takes/{take.name}/multiview/overlay/neutral.png"
+        rows.append(["multiview", f"{take.name}, neutral", path])
+    return rows
+
+
+def measured_against(take):
+    """What the report says a take is measured against."""
+    if take not in evaluated_takes():
+        return ""
+    return "truth" if has_truth(take) else "held-out H"
+
+
+rule quality:
+    """Joins the flagged frames of every stage: quality.tsv."""
+    input:
+        quality_files(),
+    output:
+        report(
+            R + "/quality.tsv",
+            category="Tables",
+            labels={"table": "flagged frames"},
+            caption="../report/quality.rst",
+        ),
+    log:
+        R + "/logs/quality.log",
+    benchmark:
+        R + "/benchmarks/quality.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=20,
+    params:
+        code=code_of("quality"),
+    script:
+        "../scripts/quality.py"
+
+
+rule summary:
+    """Puts tables, figures, flagged frames, overlays and the method on one page: summary.html."""
+    input:
+        measures=R + "/evaluation/measures.tsv",
+        table1=R + "/evaluation/table1.tsv",
+        picture=R + "/evaluation/table1.png",
+        quality=R + "/quality.tsv",
+        maps=of_takes(EVALUATED + "/error_maps.png", evaluated_takes()),
+        curves=of_takes(EVALUATED + "/curves.png", evaluated_takes()),
+        training=[f"{R}/models/{name}.cv.png" for name in regressor_names()],
+        overlays=[path for _, _, path in stage_overlays()],
+        videos=[f"{R}/apply/{name}/overlay.mp4" for name in CONFIG.apply.takes],
+    output:
+        report(
+            R + "/evaluation/summary.html",
+            category="Summary",
+            labels={"page": "summary"},
+            caption="../report/summary.rst",
+        ),
+    log:
+        R + "/logs/summary.log",
+    benchmark:
+        R + "/benchmarks/summary.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        cfg=cfg_of(
+            "evaluation.figures.embed_video_mb",
+            "evaluation.measures",
+            "evaluation.reference",
+            "correspondence",
+            "correction.integration",
+            "training",
+        ),
+        code=code_of("summary"),
+        names={
+            "maps": [take.name for take in evaluated_takes()],
+            "training": regressor_names(),
+            "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
+            "videos": CONFIG.apply.takes,
+        },
+        frames=[
+            {
+                "take": take.name,
+                "role": take.role,
+                "frames": len(take.frames),
+                "held_out": len(take.test_frames()),
+                "against": measured_against(take),
+            }
+            for take in used_takes()
+        ],
+    script:
+        "../scripts/summary.py"
