@@ -99,6 +99,9 @@ class NeutralConfig(StageConfig):
         [4.0, 3.0, 2.5],
         description="Stiffness of each round of photo-consistency between cameras (mm).",
     )
+    sigma_px: float = Field(
+        0.3, gt=0.01, le=10, description="Expected error of a flow vector between cameras (px)."
+    )
     polish_min_angle_deg: float = Field(
         6.0,
         gt=0,
@@ -120,7 +123,7 @@ class TrackConfig(StageConfig):
         0.5, gt=0.05, le=1.0, description="Size of the pictures against the originals (ratio)."
     )
     length_mm: float = Field(
-        6.0, gt=0.5, le=50, description="Stiffness: motion is smooth below this length (mm)."
+        3.0, gt=0.5, le=50, description="Stiffness: motion is smooth below this length (mm)."
     )
     sigma_px: float = Field(
         0.5,
@@ -135,7 +138,7 @@ class TrackConfig(StageConfig):
         8.0, gt=0.1, le=100, description="Longest motion of a vertex between two frames (mm)."
     )
     anchor_similarity: float = Field(
-        0.8,
+        0.75,
         ge=0,
         le=1,
         description="Smallest correlation of an anchor frame's pictures with the neutral's.",

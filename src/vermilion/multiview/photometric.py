@@ -100,7 +100,7 @@ def warp_to(
 class FlowMatcher:
     """Dense flow between normalised pictures (DIS, Kroeger et al. 2016), with its agreement."""
 
-    def __init__(self, finest_scale: int = 1, window_px: int = 9, variational: int = 5):
+    def __init__(self, finest_scale: int = 0, window_px: int = 9, variational: int = 0):
         self._flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._flow.setFinestScale(finest_scale)
         self._flow.setVariationalRefinementIterations(variational)

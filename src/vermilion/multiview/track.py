@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -75,7 +76,7 @@ def track_take(
     for index in anchors[1:]:
         coarse[index] = _anchor(reference, load(frames[index]), matcher, settings)
     ends = [*anchors, len(frames)]
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in pairwise(ends):
         numbers = frames[first : last + 1]
         end = coarse[last] if last < len(frames) else None
         clip = track_clip(reference, numbers, load, coarse[first], end, matcher, settings)

@@ -1,0 +1,106 @@
+"""The stage's own files: neutral, track, landmarks of the views."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.errors import InputError
+from vermilion.files import atomic_path
+from vermilion.multiview.neutral import Neutral
+from vermilion.multiview.track import Track
+from vermilion.multiview.triangulate import SLIDING
+
+
+def read_views(
+    path: str | Path, wanted: Collection[str]
+) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Landmarks of the neutral in the cameras of `wanted`.
+
+    Returns:
+        (names, points (C, 66, 2) px, confidence (C, 66), zero for the sliding points of the jaw).
+    """
+    arrays = _load(path, ("cameras", "points_px", "confidence"))
+    names = [str(name) for name in arrays["cameras"]]
+    use = [index for index, name in enumerate(names) if name in wanted]
+    if len(use) < 2:
+        raise InputError(
+            f"a face in {len(use)} views",
+            "two or more",
+            "Look at the landmark overlay; give landmark labels where the detector fails.",
+            path=path,
+        )
+    confidence = arrays["confidence"][use].astype(np.float64)
+    confidence[:, SLIDING] = 0.0
+    return [names[index] for index in use], arrays["points_px"][use].astype(float), confidence
+
+
+def write_neutral(path: str | Path, neutral: Neutral) -> None:
+    """`.npz`: vertices_mm (V, 3); information (V,) 1/mm^2; landmarks_mm (66, 3), NaN unknown."""
+    _save(
+        path,
+        vertices_mm=neutral.vertices_mm,
+        information_per_mm2=neutral.information,
+        landmarks_mm=neutral.landmarks.points_mm,
+        landmarks_residual_px=neutral.landmarks.residual_px,
+    )
+
+
+def read_neutral(path: str | Path, n_vertices: int) -> np.ndarray:
+    """Vertices (V, 3) mm of `write_neutral`; raises InputError for another topology."""
+    vertices = _load(path, ("vertices_mm",))["vertices_mm"]
+    if vertices.shape != (n_vertices, 3):
+        raise InputError(
+            f"a neutral of shape {vertices.shape}",
+            f"({n_vertices}, 3), the template's vertices",
+            "The template has changed: remove the file and run again.",
+            path=path,
+        )
+    return vertices
+
+
+def write_track(path: str | Path, track: Track) -> None:
+    """`.npz`: frames, coarse_mm (F, V, 3) float32, similarity, anchors, reasons."""
+    _save(
+        path,
+        frames=track.frames,
+        coarse_mm=track.coarse_mm,
+        similarity=track.similarity,
+        anchors=track.anchors,
+        reasons=np.array(track.reasons, dtype=str),
+    )
+
+
+def read_track(path: str | Path, frames: Sequence[int]) -> np.ndarray:
+    """Coarse positions (F, V, 3) mm of some frames; raises InputError where one is missing."""
+    arrays = _load(path, ("frames", "coarse_mm"))
+    index = {int(number): i for i, number in enumerate(arrays["frames"])}
+    missing = [number for number in frames if number not in index]
+    if missing:
+        raise InputError(
+            f"a track without frames {missing[:5]}",
+            "all frames of the chunk",
+            "Remove the file and run again.",
+            path=path,
+        )
+    return arrays["coarse_mm"][[index[number] for number in frames]]
+
+
+def _save(path, **arrays) -> None:
+    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+        np.savez(stream, **arrays)
+
+
+def _load(path, names) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in names}
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(
+            f"an unreadable file ({error})",
+            f"a .npz with {', '.join(names)}",
+            "Remove it and run again.",
+            path=path,
+        ) from error

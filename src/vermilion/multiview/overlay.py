@@ -1,0 +1,135 @@
+"""Pictures of what the stage did: mesh over images, clouds, residuals, visibility."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.draw import colour_map, draw_mesh, draw_points, label, tile
+from vermilion.multiview.neutral import Neutral
+from vermilion.multiview.stereo import Cloud
+from vermilion.multiview.take import RefinedFrame
+from vermilion.multiview.views import Frame, View
+
+
+def show(view: View) -> np.ndarray:
+    """The picture of a view as grey RGB, (h, w, 3) uint8."""
+    grey = np.rint(np.clip(view.grey, 0, 1) * 255).astype(np.uint8)
+    return np.repeat(grey[..., None], 3, axis=2)
+
+
+def show_wires(view: View, vertices_mm: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """The picture with the mesh's edges (E, 2) drawn thinly."""
+    picture = show(view)
+    pixels = view.camera.project(vertices_mm)
+    ends = pixels[edges]
+    ends = ends[np.isfinite(ends).all(axis=(1, 2))]
+    fixed = np.rint((ends - 0.5) * 16).astype(np.int32)
+    lines = picture.copy()
+    cv2.polylines(lines, list(fixed), False, (90, 255, 140), 1, cv2.LINE_AA, 4)
+    return cv2.addWeighted(lines, 0.6, picture, 0.4, 0)
+
+
+def show_cloud(camera: Camera, cloud: Cloud) -> np.ndarray:
+    """The cloud from a camera, shaded by its normals."""
+    picture = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+    if not len(cloud):
+        return picture
+    towards = camera.centre_mm - cloud.points_mm
+    depth = np.linalg.norm(towards, axis=1)
+    shade = np.abs((cloud.normals * towards).sum(axis=1)) / depth
+    pixels = camera.project(cloud.points_mm)
+    inside = camera.in_image(pixels, 1.0)
+    order = np.argsort(-depth[inside], kind="stable")
+    column, row = np.floor(pixels[inside][order]).astype(int).T
+    value = np.rint(255 * (0.2 + 0.8 * shade[inside][order])).astype(np.uint8)
+    for down in (0, 1):
+        for right in (0, 1):
+            y = np.minimum(row + down, camera.height_px - 1)
+            x = np.minimum(column + right, camera.width_px - 1)
+            picture[y, x] = value[:, None]
+    return picture
+
+
+def pick_cameras(frame: Frame, target_mm: np.ndarray, count: int = 2) -> list[str]:
+    """The widest and the closest camera of a frame (and further ones between)."""
+    density = {
+        name: view.camera.calibration[0, 0] / view.camera.to_camera(target_mm)[2]
+        for name, view in frame.views.items()
+    }
+    inward = {
+        name: abs(np.dot(view.camera.rotation[2], _mean_axis(frame)))
+        for name, view in frame.views.items()
+    }
+    order = sorted(density, key=lambda name: (round(density[name], 1), -inward[name]))
+    closest = [n for n in order if round(density[n], 1) == round(density[order[-1]], 1)]
+    picks = [order[0], closest[0], closest[-1], order[len(order) // 2]]
+    return list(dict.fromkeys(picks))[:count]
+
+
+def _mean_axis(frame: Frame) -> np.ndarray:
+    axis = np.sum([view.camera.rotation[2] for view in frame.views.values()], axis=0)
+    return axis / np.linalg.norm(axis)
+
+
+def neutral_sheet(
+    frame: Frame, neutral: Neutral, triangles: np.ndarray, edges: np.ndarray
+) -> np.ndarray:
+    """Wires, mesh, cloud, Poisson surface and certainty of the neutral in two cameras."""
+    pictures = []
+    error = np.where(
+        neutral.information > 0, 1.0 / np.sqrt(np.maximum(neutral.information, 1e-12)), np.nan
+    )
+    colours = colour_map(error, 0.0, 0.3)
+    for name in pick_cameras(frame, neutral.vertices_mm.mean(axis=0)):
+        view = frame.views[name]
+        picture, camera = show(view), view.camera
+        landmarks = camera.project(neutral.landmarks.points_mm)
+        surface = neutral.surface
+        pictures += [
+            label(draw_points(picture, landmarks, (255, 80, 80)), f"{name}: landmarks"),
+            label(show_wires(view, neutral.vertices_mm, edges), "template"),
+            label(show_cloud(camera, neutral.cloud), "stereo points"),
+            label(
+                draw_mesh(0 * picture, camera, surface.vertices_mm, surface.triangles), "Poisson"
+            ),
+            label(draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles), "mesh"),
+            label(
+                draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles, colours),
+                "expected error, 0 to 0.3 mm",
+            ),
+        ]
+    return tile(pictures, 6)
+
+
+def frames_sheet(
+    shown: Sequence[tuple[Frame, RefinedFrame]], triangles: np.ndarray, edges: np.ndarray
+) -> np.ndarray:
+    """For some frames of a chunk: wires, mesh, cloud, residual and visibility in two cameras."""
+    pictures = []
+    for frame, refined in shown:
+        registered = refined.registered
+        vertices = registered.vertices_mm
+        residual = colour_map(registered.residual_px, 0.0, 1.0)
+        seeing = np.where(registered.cameras_seeing > 0, registered.cameras_seeing, np.nan)
+        visible = colour_map(seeing.astype(float), 0, 10, "viridis")
+        for name in pick_cameras(frame, vertices.mean(axis=0)):
+            view = frame.views[name]
+            empty, camera = 0 * show(view), view.camera
+            pictures += [
+                label(show_wires(view, vertices, edges), f"frame {frame.number} {name}"),
+                label(draw_mesh(empty, camera, vertices, triangles), "mesh"),
+                label(show_cloud(camera, refined.cloud), "stereo points"),
+                label(
+                    draw_mesh(empty, camera, vertices, triangles, residual),
+                    "residual, 0 to 1 px; grey: unseen",
+                ),
+                label(
+                    draw_mesh(empty, camera, vertices, triangles, visible),
+                    "cameras, 0 to 10; grey: unseen",
+                ),
+            ]
+    return tile(pictures, 5)

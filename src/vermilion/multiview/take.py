@@ -1,0 +1,219 @@
+"""One take's pictures and reference at every resolution; each frame's final registration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.errors import InputError
+from vermilion.faces.model import FaceModel
+from vermilion.frames import FrameSource
+from vermilion.mesh import Mesh, vertex_normals
+from vermilion.multiview.cloud import near_mesh
+from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
+from vermilion.multiview.motion import Reference, cloud_planes
+from vermilion.multiview.neutral import StereoSettings, stereo_cloud
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.refine import Registered, register_frame
+from vermilion.multiview.solver import ThinPlate
+from vermilion.multiview.stereo import Cloud
+from vermilion.multiview.views import Frame, load_frame, shrunk
+from vermilion.quality import QualityRow
+
+
+@dataclass(frozen=True)
+class ImageSettings:
+    """See `vermilion.config.multiview` for meanings and units."""
+
+    window_px: float
+    floor: float
+
+    def window_at(self, scale: float) -> float:
+        """Small pictures keep a somewhat wider window than their scale says."""
+        return self.window_px * np.sqrt(scale)
+
+
+@dataclass(frozen=True)
+class RefineSettings:
+    """See `vermilion.config.multiview` for meanings and units."""
+
+    scales: Sequence[float]
+    lengths_mm: Sequence[float]
+    sigma_px: float
+    min_agreement: float
+    max_step_mm: float
+    ray_stride_px: int
+    cloud_scale: float
+    cloud_gate_mm: float
+    max_residual_px: float
+    min_seen_percent: float
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Reads a take's frames at any resolution."""
+
+    source: FrameSource
+    cameras: Mapping[str, Camera]
+    settings: ImageSettings
+
+    def load(self, number: int, scale: float = 1.0) -> Frame:
+        """All views of a frame; see `views.load_frame`."""
+        window = self.settings.window_at(scale)
+        return load_frame(self.source, self.cameras, number, window, self.settings.floor, scale)
+
+    def at(self, frame: Frame, scale: float) -> Frame:
+        """A full-size frame at another size."""
+        if scale == 1.0:
+            return frame
+        return shrunk(frame, scale, self.settings.window_at(scale), self.settings.floor)
+
+
+@dataclass(frozen=True)
+class RefinedFrame:
+    """A frame of H.
+
+    Attributes:
+        registered: positions and how well they are known.
+        contact: between the lips.
+        cloud: the frame's stereo points near the mesh.
+        quality: its quality row.
+    """
+
+    registered: Registered
+    contact: Contact
+    cloud: Cloud
+    quality: QualityRow
+
+
+class Refiner:
+    """Registers any frame of a take to its neutral; frames do not depend on each other."""
+
+    def __init__(
+        self,
+        pictures: Pictures,
+        model: FaceModel,
+        neutral_frame: int,
+        neutral_mm: np.ndarray,
+        stereo: StereoSettings,
+        settings: RefineSettings,
+        matcher: FlowMatcher,
+    ):
+        self.pictures, self.model, self.settings, self.matcher = pictures, model, settings, matcher
+        self.neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
+        frame = pictures.load(neutral_frame)
+        self.plate = ThinPlate.of(self.neutral_mm, model.triangles)
+        self.references = {
+            scale: Reference.of(
+                pictures.at(frame, scale), self.neutral_mm, model.triangles, self.plate
+            )
+            for scale in set(settings.scales)
+        }
+        area = settings.cloud_scale**2
+        self.stereo = replace(stereo, speckle_px=round(stereo.speckle_px * area))
+
+    @cached_property
+    def lips(self) -> Lips:
+        return lips_of(self.model)
+
+    @cached_property
+    def skin(self) -> np.ndarray:
+        """Vertices (V,) that stereo points may pull: not the inside of the mouth, not the eyes."""
+        return ~(self.model.regions["mouth_inner"] | self.model.regions["eyes"])
+
+    @cached_property
+    def seen_at_neutral(self) -> np.ndarray:
+        """Vertices (V,) that two or more cameras see at the neutral."""
+        sights = self.references[self.settings.scales[-1]].sights.values()
+        return np.sum([sight.visible for sight in sights], axis=0) >= 2
+
+    def refine(self, number: int, start_mm: np.ndarray) -> RefinedFrame:
+        """Register a frame from its coarse position (V, 3); a failure is flagged, not raised."""
+        try:
+            frame = self.pictures.load(number)
+        except InputError as error:
+            return self._failed(number, start_mm, str(error))
+        cloud = self._cloud(frame, start_mm)
+        levels = [
+            (self.references[scale], self.pictures.at(frame, scale), length)
+            for scale, length in zip(self.settings.scales, self.settings.lengths_mm, strict=True)
+        ]
+        registered = register_frame(
+            levels,
+            start_mm,
+            self.matcher,
+            sigma_px=self.settings.sigma_px,
+            max_step_mm=self.settings.max_step_mm,
+            min_agreement=self.settings.min_agreement,
+            stride_px=self.settings.ray_stride_px,
+            cloud=cloud,
+            cloud_allowed=self.skin,
+            cloud_gate_mm=self.settings.cloud_gate_mm,
+        )
+        if not np.isfinite(registered.vertices_mm).all():
+            return self._failed(number, start_mm, "the solve gave no finite positions")
+        mobility = np.where(registered.cameras_seeing >= 2, 0.2, 1.0)
+        contact = resolve_contact(registered.vertices_mm, self.model.triangles, self.lips, mobility)
+        registered = replace(registered, vertices_mm=contact.vertices_mm)
+        quality = self._quality(number, frame, registered, contact, cloud)
+        return RefinedFrame(registered, contact, cloud, quality)
+
+    def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:
+        """Stereo points near the coarse mesh; none if switched off or no pair is left."""
+        if not self.settings.cloud_scale:
+            return Cloud.join([])
+        small = self.pictures.at(frame, self.settings.cloud_scale)
+        try:
+            raw = stereo_cloud(small, vertices_mm.mean(axis=0), self.stereo)
+        except InputError:  # the cameras left make no stereo pair
+            return Cloud.join([])
+        mesh = Mesh(np.asarray(vertices_mm, dtype=np.float64), self.model.triangles)
+        return near_mesh(raw, mesh, 2 * self.settings.cloud_gate_mm, self.skin)
+
+    def _quality(self, number, frame, registered, contact, cloud) -> QualityRow:
+        measured = self.seen_at_neutral & np.isfinite(registered.residual_px)
+        residual = float(np.median(registered.residual_px[measured])) if measured.any() else np.nan
+        seen = registered.cameras_seeing > 0
+        share = 100.0 * float((seen & self.seen_at_neutral).sum() / self.seen_at_neutral.sum())
+        reasons = []
+        if not share >= self.settings.min_seen_percent:
+            reasons.append(f"only {share:.0f} % of the visible vertices could be measured")
+        if not residual <= self.settings.max_residual_px:
+            reasons.append(f"median residual of {residual:.2f} px")
+        valid = not reasons
+        reasons += [f"camera {name}: {why}" for name, why in frame.missing.items()]
+        figures = {
+            "residual_px": residual,
+            "cloud_distance_mm": self._cloud_distance(registered, cloud),
+            "visible_vertices": int((registered.cameras_seeing >= 2).sum()),
+            "measured_percent": share,
+            "missing_cameras": len(frame.missing),
+            "contact_vertices": contact.penetrating,
+            "contact_deepest_mm": contact.deepest_mm,
+            "contact_left_mm": contact.left_mm,
+        }
+        return QualityRow(number, valid, "; ".join(reasons), figures)
+
+    def _cloud_distance(self, registered: Registered, cloud: Cloud) -> float:
+        normals = vertex_normals(registered.vertices_mm, self.model.triangles)
+        planes = cloud_planes(
+            registered.vertices_mm,
+            normals,
+            cloud,
+            self.skin,
+            sigma_mm=1.0,
+            gate_mm=self.settings.cloud_gate_mm,
+        )
+        near = planes.weights > 0
+        return float(np.median(np.abs(planes.heights_mm[near]))) if near.any() else np.nan
+
+    def _failed(self, number: int, start_mm: np.ndarray, reason: str) -> RefinedFrame:
+        start = np.asarray(start_mm, dtype=np.float64)
+        unknown = np.full(len(start), np.nan)
+        registered = Registered(start, np.zeros(len(start), dtype=np.uint8), unknown)
+        quality = QualityRow(number, False, reason, {})
+        return RefinedFrame(registered, Contact(start, 0, 0.0, 0.0), Cloud.join([]), quality)

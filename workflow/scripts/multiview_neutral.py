@@ -1,0 +1,56 @@
+"""The template registered to the first frame of a take: neutral, point cloud, overlay."""
+
+import cv2
+import numpy as np
+
+from vermilion.camera import read_cameras
+from vermilion.config.multiview import ImageConfig, NeutralConfig, StereoConfig
+from vermilion.faces.model import FaceModel
+from vermilion.frames import open_frames
+from vermilion.images import write_srgb8
+from vermilion.logfile import log_to
+from vermilion.mesh import unique_edges
+from vermilion.multiview.cloud import write_cloud
+from vermilion.multiview.files import read_views, write_neutral
+from vermilion.multiview.neutral import NeutralSettings, StereoSettings, register_neutral
+from vermilion.multiview.overlay import neutral_sheet
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.take import ImageSettings, Pictures
+from vermilion.multiview.triangulate import triangulate_landmarks
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg = snakemake.params.cfg
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
+    neutral = NeutralConfig(**cfg["multiview.neutral"]).model_dump()
+    limits = {name: neutral.pop(name) for name in ("min_confidence", "landmark_distance_mm")}
+    model = FaceModel.load(snakemake.input.template)
+    cameras = read_cameras(snakemake.input.cameras)
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    source = open_frames(snakemake.params.source, subject, take)
+    frame = Pictures(source, cameras, images).load(snakemake.params.frame)
+    names, points, confidence = read_views(snakemake.input.landmarks, frame.views)
+    landmarks = triangulate_landmarks(
+        cameras,
+        names,
+        points,
+        confidence,
+        min_confidence=limits["min_confidence"],
+        max_distance_mm=limits["landmark_distance_mm"],
+    )
+    found = register_neutral(
+        frame, model, landmarks, stereo, NeutralSettings(**neutral), FlowMatcher()
+    )
+    print(f"{int(landmarks.valid.sum())} landmarks, {len(found.cloud)} points")
+    print(f"seen by a pair: {np.mean(found.information > 0):.0%} of the vertices")
+    write_neutral(snakemake.output.neutral, found)
+    write_cloud(snakemake.output.cloud, found.cloud)
+    sheet = neutral_sheet(frame, found, model.triangles, unique_edges(model.triangles))
+    write_srgb8(snakemake.output.overlay, sheet)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,59 @@
+"""The frames of a chunk registered to the neutral: meshes, visibility, quality, overlay."""
+
+import cv2
+import numpy as np
+
+from vermilion.camera import read_cameras
+from vermilion.config.multiview import ImageConfig, RefineConfig, StereoConfig
+from vermilion.faces.model import FaceModel
+from vermilion.files import atomic_path
+from vermilion.frames import open_frames
+from vermilion.images import write_srgb8
+from vermilion.logfile import log_to
+from vermilion.mesh import unique_edges
+from vermilion.multiview.files import read_neutral, read_track
+from vermilion.multiview.neutral import StereoSettings
+from vermilion.multiview.overlay import frames_sheet
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.progress import progress
+from vermilion.quality import write_quality
+from vermilion.sequences import write_sequence
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg, frames = snakemake.params.cfg, snakemake.params.frames
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
+    settings = RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump())
+    model = FaceModel.load(snakemake.input.template)
+    source = open_frames(snakemake.params.source, subject, take)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
+    coarse = read_track(snakemake.input.track, frames)
+    refiner = Refiner(
+        pictures, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
+    )
+    drawn = {frames[i] for i in np.linspace(0, len(frames) - 1, 3).astype(int)}
+    refined, shown = [], []
+    for number, start in progress(zip(frames, coarse, strict=True), "multiview", len(frames)):
+        found = refiner.refine(number, start)
+        refined.append(found)
+        if number in drawn and found.quality.valid:
+            shown.append((pictures.load(number), found))
+    write_sequence(snakemake.output.meshes, np.array([f.registered.vertices_mm for f in refined]))
+    with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
+        np.save(stream, np.array([f.registered.cameras_seeing for f in refined]))
+    rows = [f.quality for f in refined]
+    write_quality(snakemake.output.quality, subject, take, "multiview", rows)
+    write_srgb8(
+        snakemake.output.overlay,
+        frames_sheet(shown, model.triangles, unique_edges(model.triangles)),
+    )
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
