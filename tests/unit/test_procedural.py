@@ -135,7 +135,7 @@ def test_parts_have_their_own_topologies(studio, template, tracker):
 
 
 def test_building_twice_gives_the_same_model():
-    a, b = tracker_model(3000), tracker_model(3000)
+    a, b = tracker_model(2500), tracker_model(2500)
     np.testing.assert_array_equal(a.neutral_mm, b.neutral_mm)
     np.testing.assert_array_equal(a.triangles, b.triangles)
     np.testing.assert_array_equal(a.expressions_mm, b.expressions_mm)
@@ -307,8 +307,7 @@ def test_lip_modes_change_the_height_of_the_red(studio):
 
 
 def test_seeds_make_small_asymmetries():
-    even, odd = tracker_model(3000), studio_model(spacing_mm=2.0, seed=5)
-    assert even.n_identities == odd.n_identities
+    odd = studio_model(spacing_mm=2.5, seed=5)
     p = odd.neutral_mm[odd.landmarks]
     assert 0.02 < abs(p[58, 0] + p[62, 0]) + abs(p[58, 1] - p[62, 1]) < 4.0
 

@@ -12,7 +12,7 @@ from vermilion.faces.procedural_head import chart_of, locate
 # Jaw, subject's left from the ear to the chin: azimuth and polar angle in degrees.
 _JAW = [(86, 87), (84, 96), (81, 105), (77, 114), (70, 121), (56, 125), (38, 127.5), (20, 128.5)]
 _CHIN = (0.0, 129.0)
-_BROW_MM = [(11, 45), (19, 49), (28, 50.5), (37, 49), (45, 44.5)]  # inner to outer
+_BROW_MM = [(10.5, 44.5), (19, 47.5), (28, 48.8), (37, 48), (45.5, 44.2)]  # inner to outer
 _BRIDGE_MM = [(0, 33), (0, 22), (0, 10), (0, -6)]
 _NOSE_BASE_MM = [(11, -16), (6, -19), (0, -21)]
 
