@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
-
 from vermilion.errors import InputError
 from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.tracking.expression import FitSettings

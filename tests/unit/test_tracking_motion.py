@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.unit.synthetic_face import synthetic_model
 
+from tests.unit.synthetic_face import synthetic_model
 from vermilion.errors import InputError
 from vermilion.tracking.expression import FitSettings, fit_motion
 from vermilion.tracking.observation import Observations, project
@@ -12,8 +12,13 @@ from vermilion.tracking.shape import LandmarkShape
 
 FOCAL_PX, FPS, N_FRAMES = 1400.0, 30.0, 40
 SHAPE = LandmarkShape.of(synthetic_model())
-LOOSE = FitSettings(weight_sigma=100.0, weight_acceleration=1e9, rotation_acceleration_deg=1e9,
-                    translation_acceleration_mm=1e9, jaw_slide=1.0)
+LOOSE = FitSettings(
+    weight_sigma=100.0,
+    weight_acceleration=1e9,
+    rotation_acceleration_deg=1e9,
+    translation_acceleration_mm=1e9,
+    jaw_slide=1.0,
+)
 
 
 def true_motion(n_frames=N_FRAMES):

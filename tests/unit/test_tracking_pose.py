@@ -1,8 +1,8 @@
 """Rotations and the scaled orthographic pose."""
 
 import numpy as np
-from tests.unit.synthetic_face import landmark_layout
 
+from tests.unit.synthetic_face import landmark_layout
 from vermilion.tracking.pose import (
     left_jacobian,
     nearest_rotation,
