@@ -28,9 +28,17 @@ def apply_exports():
     return outputs
 
 
+def applied_takes():
+    """Takes to be corrected, `subject/take`: those named, or all that have no tattoo."""
+    rows = takes(("video", "tracked"))
+    return CONFIG.apply.takes or [
+        take.name for take in rows if take.name not in CONFIG.landmarks.training_takes
+    ]
+
+
 def apply_outputs():
     """The overlay videos, and with them all files, of the takes to be corrected."""
-    return [f"{R}/apply/{name}/overlay.mp4" for name in CONFIG.apply.takes]
+    return [f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()]
 
 
 rule apply:

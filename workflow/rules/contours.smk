@@ -4,13 +4,13 @@ from vermilion.contours.labels import label_paths
 
 
 def contour_labels(wildcards):
-    """Contours drawn on frames of the take's monocular camera, where the capture exists already.
-
-    The studio's labels appear with its frames, on which the manifests depend.
-    """
+    """Contours drawn on frames of the take's monocular camera."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        return []
+        folder = f"{R}/captures/{take.name}/labels/contours"
+        return [
+            f"{folder}/{camera}/{frame:06d}.json" for camera, frame in studio_contour_labels(take)
+        ]
     labels = label_paths(take.source, mono_camera(wildcards))
     return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
 

@@ -50,7 +50,9 @@ def landmark_model_inputs(wildcards):
     for take in training_takes():
         pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
         inputs += expand_chunks(pattern, take.subject, take.take)
-        if take.source != STUDIO:
+        if take.source == STUDIO:
+            inputs += [path for path in studio_label_files(take) if "/landmarks/" in path]
+        else:
             inputs += [str(path) for path in label_files(take.source)]
     return inputs
 
