@@ -4,7 +4,7 @@
 def used_takes(role=None):
     """Takes that the database, the evaluation or the application needs."""
     wanted = {take.name for take in database_takes() + evaluated_takes()}
-    wanted |= set(CONFIG.apply.takes)
+    wanted |= set(applied_takes())
     people = {name.split("/")[0] for name in wanted}
     wanted |= {take.name for take in takes("plain") if take.subject in people}
     return [take for take in takes(role) if take.name in wanted]
@@ -38,7 +38,7 @@ def quality_files():
     people = subjects("tattoo")
     paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
     paths += of_takes(EVALUATED + "/quality.tsv", evaluated_takes())
-    for name in CONFIG.apply.takes:
+    for name in applied_takes():
         paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))
     return paths
 
@@ -100,7 +100,7 @@ rule summary:
         curves=of_takes(EVALUATED + "/curves.png", evaluated_takes()),
         training=[f"{R}/models/{name}.cv.png" for name in regressor_names()],
         overlays=[path for _, _, path in stage_overlays()],
-        videos=[f"{R}/apply/{name}/overlay.mp4" for name in CONFIG.apply.takes],
+        videos=[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
     output:
         report(
             R + "/evaluation/summary.html",
@@ -129,7 +129,7 @@ rule summary:
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),
             "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
-            "videos": CONFIG.apply.takes,
+            "videos": applied_takes(),
         },
         frames=[
             {
