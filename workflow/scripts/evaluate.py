@@ -8,6 +8,7 @@ from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.errors import InputError
 from vermilion.evaluation.closest import SurfacePoints
+from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import (
     CoarseTake,
     corrected_by,
