@@ -57,7 +57,7 @@ def synthetic_model(n_identities: int = 4) -> FaceModel:
         name="synthetic",
         neutral_mm=points,
         triangles=np.stack([np.arange(64), np.arange(1, 65), np.arange(2, 66)], axis=1),
-        expression_names=tuple(["jawOpen", "smile_R", "smile_L", "pucker", "brow_R", "brow_L"]),
+        expression_names=("jawOpen", "smile_R", "smile_L", "pucker", "brow_R", "brow_L"),
         expressions_mm=expressions,
         identities_mm=identities,
         uv=np.zeros((66, 2), dtype=np.float32),
