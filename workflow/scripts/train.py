@@ -16,9 +16,10 @@ def main(snakemake):
         data = database.training_set(training_subjects(name, database.subjects))
         place = (database.feature_names, database.mask, database.area_mm2, database.topology)
     model, curve = train(name, data, *place, selection)
-    print(curve_table(name, curve).to_string())
-    write_table(output.curve, curve_table(name, curve))
-    plot_curve(output.picture, name, curve)
+    table = curve_table(name, curve, selection.choice)
+    print(table.to_string())
+    write_table(output.curve, table)
+    plot_curve(output.picture, name, curve, selection.choice)
     save_model(output.model, model)
 
 

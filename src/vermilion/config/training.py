@@ -41,7 +41,7 @@ class TrainingConfig(StageConfig):
         "features scaled to a total variance of 1.",
     )
     affine_alphas: list[Positive] = Field(
-        [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0],
+        [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0],
         min_length=1,
         description="Tikhonov parameters of the affine regressor that cross-validation tries.",
     )
@@ -52,4 +52,10 @@ class TrainingConfig(StageConfig):
         le=10_000,
         description="Length of the clips that are held out whole (frames); shorter where there are "
         "too few frames for the folds.",
+    )
+    choice: Literal["simplest", "least"] = Field(
+        "simplest",
+        description="`least`: the grid point of the least cross-validation error. `simplest`: the "
+        "one with the fewest effective degrees of freedom within one standard error of it, which "
+        "goes further beyond the training where there are few clips.",
     )

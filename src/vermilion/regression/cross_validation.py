@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy import linalg
@@ -17,6 +18,8 @@ from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
 from vermilion.regression.scaling import feature_scale
+
+Rule = Literal["simplest", "least"]
 
 #: (rows to train on, rows to judge) -> their activations.
 DesignOfFold = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -31,12 +34,14 @@ class Curve:
         betas: (B,); NaN for a regressor without beta.
         errors: (B, A, folds) RMS over the entries of the layer, each fold's frames.
         frames: (folds,) held-out frames.
+        freedom: (B, A) effective degrees of freedom of the fit on all rows.
     """
 
     alphas: np.ndarray
     betas: np.ndarray
     errors: np.ndarray
     frames: np.ndarray
+    freedom: np.ndarray
 
     @property
     def mean(self) -> np.ndarray:
@@ -48,11 +53,19 @@ class Curve:
         """(B, A) standard error of the mean over folds."""
         return self.errors.std(axis=2, ddof=1) / np.sqrt(self.errors.shape[2])
 
-    def best(self) -> tuple[float, float, float]:
-        """(alpha, beta, error) of the least mean error; the larger alpha where equal."""
-        mean = self.mean[:, ::-1]
-        row, column = np.unravel_index(np.argmin(mean), mean.shape)
-        return float(self.alphas[::-1][column]), float(self.betas[row]), float(mean[row, column])
+    def choose(self, rule: Rule = "simplest") -> tuple[int, int]:
+        """Index (beta, alpha) of the choice.
+
+        `least`: the least mean error. `simplest`: the least degrees of freedom among the points
+        whose error is within one standard error of the least (Breiman et al. 1984): where folds
+        cannot tell two points apart, the smoother one goes further beyond the training.
+        """
+        mean = self.mean
+        least = np.unravel_index(np.argmin(mean), mean.shape)
+        if rule == "simplest":
+            close = mean <= mean[least] + self.standard_error[least]
+            least = np.unravel_index(np.argmin(np.where(close, self.freedom, np.inf)), mean.shape)
+        return int(least[0]), int(least[1])
 
 
 def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
@@ -130,6 +143,7 @@ def cross_validate_rbf(
         np.asarray(betas, float),
         np.stack([e for e, _ in errors]),
         errors[0][1],
+        np.stack([_degrees_of_freedom(design_of(b), len(features), alphas) for b in betas]),
     )
 
 
@@ -151,7 +165,19 @@ def cross_validate_affine(
         return scaled[train], scaled[held]
 
     errors, frames = _fold_errors(design, gram, clips, alphas, n_folds, n_outputs)
-    return Curve(np.asarray(alphas, float), np.array([np.nan]), errors[None], frames)
+    freedom = _degrees_of_freedom(design, len(features), alphas)[None]
+    return Curve(np.asarray(alphas, float), np.array([np.nan]), errors[None], frames, freedom)
+
+
+def _degrees_of_freedom(
+    design_of: DesignOfFold, n_rows: int, alphas: Sequence[float]
+) -> np.ndarray:
+    """Trace of the map from targets to fitted values, the bias left out, (A,)."""
+    everything = np.arange(n_rows)
+    activations, _ = design_of(everything, everything[:0])
+    activations = activations - activations.mean(axis=0)
+    eigenvalues = np.maximum(linalg.eigvalsh(activations.T @ activations), 0.0)
+    return (eigenvalues / (eigenvalues + np.asarray(alphas, float)[:, None])).sum(axis=1)
 
 
 def _fold_errors(

@@ -11,10 +11,10 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from vermilion.files import atomic_path
-from vermilion.regression.cross_validation import Curve
+from vermilion.regression.cross_validation import Curve, Rule
 
 
-def plot_curve(path: str | Path, name: str, curve: Curve) -> None:
+def plot_curve(path: str | Path, name: str, curve: Curve, choice: Rule = "simplest") -> None:
     """Held-out error over alpha, one line a beta, the choice marked; PNG."""
     figure, axes = plt.subplots(figsize=(6.4, 4.0), dpi=110, layout="constrained")
     mean, deviation = curve.mean, curve.standard_error
@@ -22,7 +22,8 @@ def plot_curve(path: str | Path, name: str, curve: Curve) -> None:
     for beta, error, spread, colour in zip(curve.betas, mean, deviation, colours, strict=True):
         text = "affine" if np.isnan(beta) else f"beta {beta:g}"
         axes.errorbar(curve.alphas, error, spread, label=text, color=colour, capsize=2, lw=1.2)
-    alpha, _, error = curve.best()
+    row, column = curve.choose(choice)
+    alpha, error = curve.alphas[column], mean[row, column]
     axes.plot([alpha], [error], "o", ms=10, mfc="none", mec="crimson", label=f"chosen: {error:.3f}")
     axes.set(
         xscale="log",

@@ -13,6 +13,7 @@ from vermilion.database.schema import TrainingSet
 from vermilion.errors import InputError
 from vermilion.regression.cross_validation import (
     Curve,
+    Rule,
     clips_of,
     cross_validate_affine,
     cross_validate_rbf,
@@ -39,9 +40,10 @@ class Selection:
     scaling: Literal["group", "feature"] = "group"
     alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
     betas: Sequence[float] = (0.03, 0.1, 0.3, 1.0, 3.0)
-    affine_alphas: Sequence[float] = (1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0)
+    affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
     folds: int = 5
     clip_frames: int = 30
+    choice: Rule = "simplest"
 
 
 def split_name(regressor: str) -> tuple[str, str | None, str]:
@@ -115,7 +117,8 @@ def train(
         curve = cross_validate_affine(
             features, gram, weights.sum(), clips, alphas=sorted(selection.affine_alphas), **common
         )
-        estimator = AffineRegressor(curve.best()[0], groups).fit(features, data.layers)
+        _, chosen = curve.choose(selection.choice)
+        estimator = AffineRegressor(float(curve.alphas[chosen]), groups).fit(features, data.layers)
     else:
         prototypes = {
             "prototype_stride": selection.prototype_stride,
@@ -132,7 +135,8 @@ def train(
             **prototypes,
             **common,
         )
-        alpha, beta, _ = curve.best()
+        row, column = curve.choose(selection.choice)
+        alpha, beta = float(curve.alphas[column]), float(curve.betas[row])
         estimator = RBFNetwork(alpha, beta, **prototypes, feature_groups=groups)
         estimator.fit(features, data.layers, data.sequences)
     used = {
@@ -152,10 +156,10 @@ def train(
     return model, curve
 
 
-def curve_table(name: str, curve: Curve) -> pd.DataFrame:
+def curve_table(name: str, curve: Curve, choice: Rule = "simplest") -> pd.DataFrame:
     """The cross-validation curve, one row a grid point, for the report."""
     mean, deviation = curve.mean, curve.standard_error
-    best = curve.best()[:2]
+    chosen = curve.choose(choice)
     rows = [
         {
             "regressor": name,
@@ -165,7 +169,8 @@ def curve_table(name: str, curve: Curve) -> pd.DataFrame:
             "feature_error_se": deviation[i, j],
             "folds": len(curve.frames),
             "frames": int(curve.frames.sum()),
-            "chosen": int(alpha == best[0] and (beta == best[1] or np.isnan(beta))),
+            "freedom": curve.freedom[i, j],
+            "chosen": int((i, j) == chosen),
         }
         for i, beta in enumerate(curve.betas)
         for j, alpha in enumerate(curve.alphas)
