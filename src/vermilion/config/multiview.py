@@ -157,7 +157,7 @@ class RefineConfig(StageConfig):
         description="Size of the pictures in each round against the originals (ratio).",
     )
     lengths_mm: list[float] = Field(
-        [4.0, 1.5],
+        [2.5, 1.0],
         min_length=1,
         description="Stiffness of each round: details below it come from the neutral (mm).",
     )
@@ -165,7 +165,7 @@ class RefineConfig(StageConfig):
         0.3, gt=0.01, le=10, description="Expected error of a flow vector (px)."
     )
     min_agreement: float = Field(
-        0.4, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
+        0.3, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
     )
     max_step_mm: float = Field(
         8.0, gt=0.1, le=100, description="Longest motion of a vertex in a round (mm)."
