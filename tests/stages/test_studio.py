@@ -57,6 +57,8 @@ def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights=
         performance={
             "performance": performance,
             "seed": seed,
+            "poses": 0,
+            "pose_seconds": (0.22, 0.42),
             "csv": None,
             "csv_first": 0,
             "csv_fps": 30.0,

@@ -39,6 +39,19 @@ def test_generated_curves_depend_on_the_seed_alone():
     assert not np.allclose(first, generated_weights(NAMES, 60, 30.0, seed=2))
 
 
+def test_few_poses_come_again_and_again():
+    few = generated_weights(NAMES, 240, 30.0, seed=1, n_poses=3, pose_seconds=(0.1, 0.15))
+    used = few.max(axis=0) > 0
+    assert dict(zip(NAMES, used, strict=True)) == {
+        "jawOpen": True,
+        "mouthPucker": True,
+        "mouthSmile_L": False,
+        "mouthSmile_R": False,
+        "mouthRollLower": True,
+        "eyeBlink_L": True,
+    }
+
+
 def test_the_length_of_a_take_does_not_change_its_beginning():
     short, long = (generated_weights(NAMES[:5], n, 30.0, seed=4) for n in (40, 80))
     assert np.allclose(short, long[:40])

@@ -19,6 +19,17 @@ class StudioTake(StageConfig):
         "(to train the embedded landmark regressor).",
     )
     seed: int = Field(0, ge=0, description="Seed of the curves and of the head motion.")
+    poses: int = Field(
+        0,
+        ge=0,
+        le=100,
+        description="`generated` only: how many different mouth poses the curves visit, again and "
+        "again (0: all, more than twenty). Few poses suit short takes.",
+    )
+    pose_seconds: tuple[float, float] = Field(
+        (0.22, 0.42),
+        description="`generated` only: shortest and longest time that a pose takes to come (s).",
+    )
     csv: str | None = Field(
         None, description="`live_link` only: the CSV file with ARKit weights, one row a frame."
     )
@@ -33,9 +44,11 @@ class StudioTake(StageConfig):
     )
 
     @model_validator(mode="after")
-    def _live_link_needs_csv(self) -> StudioTake:
+    def _check_together(self) -> StudioTake:
         if self.performance == "live_link" and not self.csv:
             raise ValueError("performance is 'live_link' but csv is empty; name the CSV file")
+        if not 0 < self.pose_seconds[0] <= self.pose_seconds[1]:
+            raise ValueError("pose_seconds must be two rising times above 0 s")
         return self
 
 

@@ -111,10 +111,10 @@ def _skin_albedo(out, volume, look, brows, chin, p, lip, inside, footprint):
         gr += (look.inside[1] * dark - gr) * deep
         b += (look.inside[2] * dark - b) * deep
         if look.tattoo > 0.0 and lip > 0.0:
-            n = 0.8 * _octave(volume, x, y, z, 0.42, footprint, 0.5)
-            n += 0.5 * _octave(volume, x, y, z, 0.8, footprint, -0.7)
+            n = 0.8 * _octave(volume, x, y, z, 0.34, footprint, 0.5)
+            n += 0.5 * _octave(volume, x, y, z, 0.62, footprint, -0.7)
             soft = 0.16 + 0.35 * footprint
-            ink = _smoothstep(-soft, soft, n + 0.12)
+            ink = _smoothstep(-soft, soft, n + 0.05)
             w = _smoothstep(0.0, 0.45, lip) * (1.0 - _smoothstep(2.2, 3.2, inside)) * look.tattoo
             grain = 1.0 + 0.06 * pores
             inks = look.paint_dark + (look.paint_light - look.paint_dark) * np.float32(ink)

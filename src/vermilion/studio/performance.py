@@ -10,25 +10,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-#: Poses that generated curves visit: ARKit weights; those that a model lacks are left out.
+#: Poses that generated curves visit, the most different first: ARKit weights (and outward rolls,
+#: where a model has them); shapes that a model lacks are left out.
 MOUTH_POSES: tuple[dict[str, float], ...] = (
+    {"mouthRollLower": 0.75, "mouthRollUpper": 0.75, "jawOpen": 0.06},
     {"jawOpen": 0.55},
-    {"jawOpen": 0.30, "mouthSmile_L": 0.75, "mouthSmile_R": 0.75},
     {"mouthPucker": 0.85, "jawOpen": 0.08},
-    {"mouthFunnel": 0.80, "jawOpen": 0.25},
     {"mouthSmile_L": 0.90, "mouthSmile_R": 0.90, "mouthDimple_L": 0.3, "mouthDimple_R": 0.3},
-    {"mouthFrown_L": 0.75, "mouthFrown_R": 0.75, "mouthShrugLower": 0.35},
-    {"mouthStretch_L": 0.70, "mouthStretch_R": 0.70, "jawOpen": 0.12},
+    {"mouthFunnel": 0.80, "jawOpen": 0.25},
     {"mouthPress_L": 0.70, "mouthPress_R": 0.70, "mouthClose": 0.06, "jawOpen": 0.06},
+    {"mouthRollOutLower": 0.7, "mouthRollOutUpper": 0.7, "jawOpen": 0.1},
+    {"mouthLowerDown_L": 0.75, "mouthLowerDown_R": 0.75, "jawOpen": 0.08},
+    {"mouthRollLower": 0.85, "jawOpen": 0.10},
+    {"mouthUpperUp_L": 0.70, "mouthUpperUp_R": 0.70, "jawOpen": 0.12},
+    {"mouthStretch_L": 0.70, "mouthStretch_R": 0.70, "jawOpen": 0.12},
+    {"mouthRollUpper": 0.80, "jawOpen": 0.08},
+    {"jawOpen": 0.30, "mouthSmile_L": 0.75, "mouthSmile_R": 0.75},
+    {"mouthFrown_L": 0.75, "mouthFrown_R": 0.75, "mouthShrugLower": 0.35},
     {"mouthLeft": 0.70},
     {"mouthRight": 0.70},
-    {"mouthRollLower": 0.85, "jawOpen": 0.10},
-    {"mouthRollUpper": 0.80, "jawOpen": 0.08},
-    {"mouthRollLower": 0.75, "mouthRollUpper": 0.75, "jawOpen": 0.06},
-    {"mouthUpperUp_L": 0.70, "mouthUpperUp_R": 0.70, "jawOpen": 0.12},
-    {"mouthLowerDown_L": 0.75, "mouthLowerDown_R": 0.75, "jawOpen": 0.08},
     {"mouthRollOutLower": 0.8, "jawOpen": 0.1},
-    {"mouthRollOutLower": 0.7, "mouthRollOutUpper": 0.7, "jawOpen": 0.1},
     {"mouthPucker": 0.45, "mouthFunnel": 0.45, "jawOpen": 0.35},
     {"jawLeft": 0.45, "jawOpen": 0.25},
     {"jawRight": 0.45, "jawOpen": 0.25},
@@ -53,8 +54,6 @@ UPPER_FACE = (  # pairs; a shape without sides stands twice
     "eyeSquint_R",
 )
 OPENING = "jawOpen"
-#: Seconds that a generated pose takes to come, shortest and longest.
-POSE_SECONDS = (0.22, 0.42)
 
 
 @dataclass(frozen=True)
@@ -78,15 +77,23 @@ class Performance:
 
 
 def generated_weights(
-    names: tuple[str, ...], n_frames: int, fps: float, seed: int, intensity: float = 1.0
+    names: tuple[str, ...],
+    n_frames: int,
+    fps: float,
+    seed: int,
+    intensity: float = 1.0,
+    n_poses: int = 0,
+    pose_seconds: tuple[float, float] = (0.22, 0.42),
 ) -> np.ndarray:
     """Curves (F, K) that visit the mouth poses in random order, with brows and blinks.
 
-    The whole set is visited before one comes again, so that short takes differ by their seeds and
-    long ones hold everything. Neighbouring poses blend into each other, mixtures included.
+    The whole set (the first `n_poses` of it, or all where that is 0) is visited before one comes
+    again. A pose takes `pose_seconds` (shortest, longest) to come; neighbouring poses blend into
+    each other, mixtures included.
     """
     rng = np.random.default_rng([seed, 7002])
-    poses = [pose for pose in (_pose(p, names) for p in MOUTH_POSES) if pose.any()]
+    poses = _poses(names)
+    poses = poses[:n_poses] if n_poses else poses
     time_s, knots, values = 0.0, [0.0], [np.zeros(len(names))]
     end_s = n_frames / fps
     order: list[int] = []
@@ -95,7 +102,7 @@ def generated_weights(
         pose = poses[order.pop()] * rng.uniform(0.7, 1.1)
         if rng.random() < 0.35:  # a mixture, as in speech
             pose = 0.6 * pose + 0.5 * poses[rng.integers(len(poses))]
-        time_s += rng.uniform(*POSE_SECONDS)
+        time_s += rng.uniform(*pose_seconds)
         knots.append(time_s)
         values.append(pose)
         if rng.random() < 0.3:
@@ -142,7 +149,7 @@ def head_motion(
 def random_poses(names: tuple[str, ...], count: int, seed: int) -> np.ndarray:
     """Independent expressions (count, K): a mouth pose or a mixture, brows, blinks."""
     rng = np.random.default_rng([seed, 7004])
-    poses = [pose for pose in (_pose(p, names) for p in MOUTH_POSES) if pose.any()]
+    poses = _poses(names)
     weights = np.zeros((count, len(names)))
     for row in weights:
         first, second = rng.integers(len(poses), size=2)
@@ -155,6 +162,11 @@ def random_poses(names: tuple[str, ...], count: int, seed: int) -> np.ndarray:
         blink = rng.uniform(0.0, 1.0) if rng.random() < 0.2 else rng.uniform(0.0, 0.2)
         _add_blink(row[None], names, np.array([blink]))
     return np.clip(weights, 0.0, 1.0)
+
+
+def _poses(names: tuple[str, ...]) -> list[np.ndarray]:
+    """The poses (K,) that a model with these expressions can take."""
+    return [pose for pose in (_pose(weights, names) for weights in MOUTH_POSES) if pose.any()]
 
 
 def _pose(weights: dict[str, float], names: tuple[str, ...]) -> np.ndarray:

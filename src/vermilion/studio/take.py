@@ -93,6 +93,8 @@ def plan_take(
     take_seed: int,
     identity: np.ndarray,
     performance: str = "generated",
+    poses: int = 0,
+    pose_seconds: tuple[float, float] = (0.22, 0.42),
     csv: str | None = None,
     csv_first: int = 0,
     csv_fps: float = 30.0,
@@ -112,7 +114,9 @@ def plan_take(
     if performance == "live_link":
         weights = read_live_link(csv, names, n_frames, fps, csv_first, csv_fps)
     else:
-        weights = generated_weights(names, n_frames, fps, seed, intensity)
+        weights = generated_weights(
+            names, n_frames, fps, seed, intensity, poses, tuple(pose_seconds)
+        )
     weights = start_at_neutral(names, weights, slight_open, ease_in_frames)
     neck = model.neutral_mm[model.landmarks[8]] + [0.0, -40.0, -70.0]
     motion = head_motion(n_frames, fps, seed, head_turn_deg, head_shift_mm, neck)
@@ -168,7 +172,8 @@ def plan_of(
 
     Args:
         actor: `seed` and `identity` of the subject.
-        performance: `performance`, `seed`, `csv`, `csv_first`, `csv_fps`, `lights` of the take.
+        performance: `performance`, `seed`, `poses`, `pose_seconds`, `csv`, `csv_first`, `csv_fps`
+            and `lights` of the take.
     """
     n_frames = last - first + 1
     actor_seed = int(np.random.default_rng([seed, actor["seed"]]).integers(2**31))
@@ -183,6 +188,8 @@ def plan_of(
         take_seed=performance["seed"],
         identity=identity_of(model, actor["identity"], actor_seed, identity_spread),
         performance=performance["performance"],
+        poses=performance["poses"],
+        pose_seconds=performance["pose_seconds"],
         csv=performance["csv"],
         csv_first=performance["csv_first"],
         csv_fps=performance["csv_fps"],
