@@ -55,10 +55,10 @@ def integration_domain(
     n_vertices = len(vertices_mm)
     in_mask = np.zeros(n_vertices, dtype=bool)
     in_mask[triangles[mask]] = True
+    if in_mask[triangles].all():
+        raise ValueError("the mask covers the whole mesh: nothing is left to hold it in place")
     followers = _followers(triangles, n_vertices, in_mask)
     outside = ~(in_mask | followers)
-    if not outside[triangles].any():
-        raise ValueError("the mask covers the whole mesh: nothing is left to hold it in place")
 
     if seam_mm > 0:
         far = _distance_from(vertices_mm, triangles, in_mask | followers)

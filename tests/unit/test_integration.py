@@ -1,0 +1,141 @@
+"""Integration of layers: exact where a mesh exists, fixed outside, smooth at the seam."""
+
+import numpy as np
+import pytest
+
+from vermilion.correction.integration import LayerIntegrator, edge_stiffness
+from vermilion.correction.layers import correction_layers, decode_layers
+
+
+def sheet(n=36, size_mm=180.0):
+    """A bumpy sheet with irregular triangles: (vertices, triangles, distance to its middle)."""
+    axis = np.linspace(-size_mm / 2, size_mm / 2, n)
+    x, y = np.meshgrid(axis, axis)
+    rng = np.random.default_rng(0)
+    flat = np.stack([x, y], axis=-1).reshape(-1, 2) + rng.normal(scale=0.8, size=(n * n, 2))
+    height = 15 * np.cos(flat[:, 0] / 40) * np.cos(flat[:, 1] / 30)
+    index = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (index[i : n - 1 + i, j : n - 1 + j].ravel() for i in (0, 1) for j in (0, 1))
+    triangles = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+    return np.column_stack([flat, height]), triangles, np.linalg.norm(flat, axis=1)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Neutral, topology, mask, and a coarse and an accurate sequence that agree outside it."""
+    neutral, triangles, radius = sheet()
+    mask = np.flatnonzero((radius < 60)[triangles].all(axis=1))
+    rng = np.random.default_rng(1)
+    phases = rng.uniform(0, 6, size=(5, 1, 3))
+    coarse = neutral + 3 * np.sin(neutral / 21 + phases)
+    fade = np.clip(1 - radius / 45, 0, 1)[:, None]
+    accurate = coarse + 9 * fade * np.sin(neutral / 9 - phases)
+    return neutral, triangles, mask, coarse, accurate
+
+
+@pytest.mark.parametrize("seam_mm", [0.0, 8.0, 25.0])
+def test_true_layers_return_the_true_mesh(scene, seam_mm):
+    neutral, triangles, mask, coarse, accurate = scene
+    layers = correction_layers(coarse, accurate, triangles[mask])
+    corrected = LayerIntegrator(neutral, triangles, mask, seam_mm).integrate(coarse, layers)
+    np.testing.assert_allclose(corrected, accurate, atol=1e-6)  # mm
+
+
+def test_zero_layers_return_the_coarse_mesh(scene):
+    neutral, triangles, mask, coarse, _ = scene
+    zero = np.zeros((len(coarse), len(mask), 9))
+    corrected = LayerIntegrator(neutral, triangles, mask).integrate(coarse, zero)
+    np.testing.assert_array_equal(corrected, coarse)
+
+
+@pytest.mark.parametrize("seam_mm", [0.0, 8.0])
+def test_the_face_beyond_the_seam_does_not_move(scene, seam_mm):
+    neutral, triangles, mask, coarse, _ = scene
+    layers = np.random.default_rng(5).normal(scale=0.3, size=(len(coarse), len(mask), 9))
+    integrator = LayerIntegrator(neutral, triangles, mask, seam_mm)
+    moved = np.linalg.norm(integrator.integrate(coarse, layers) - coarse, axis=2).max(axis=0)
+    free = np.zeros(len(neutral), dtype=bool)
+    free[integrator.free] = True
+    assert np.all(moved[~free] == 0)
+    in_mask = np.zeros(len(neutral), dtype=bool)
+    in_mask[triangles[mask]] = True
+    if seam_mm == 0:
+        assert np.all(moved[~in_mask] == 0)
+    else:
+        assert np.linalg.norm(neutral[free & ~in_mask, :2], axis=1).max() < 60 + seam_mm + 1
+
+
+def test_the_seam_spreads_the_step_at_the_border(scene):
+    """A mask that wants to turn bends less sharply at its border with a seam than without."""
+    neutral, triangles, mask, coarse, _ = scene
+    layers = np.zeros((1, len(mask), 9))
+    layers[..., 2] = 0.15  # rad about z: incompatible with a fixed border
+    creases = []
+    for seam_mm in (0.0, 20.0):
+        corrected = LayerIntegrator(neutral, triangles, mask, seam_mm).integrate(coarse[:1], layers)
+        change = correction_layers(coarse[:1], corrected, triangles)[0, :, 3:]
+        creases.append(np.abs(change).max())
+    assert creases[1] < 0.95 * creases[0]
+
+
+def test_blocks_of_frames_change_nothing(scene):
+    neutral, triangles, mask, coarse, accurate = scene
+    layers = correction_layers(coarse, accurate, triangles[mask]).astype(np.float32)
+    integrator = LayerIntegrator(neutral, triangles, mask)
+    np.testing.assert_allclose(
+        integrator.integrate(coarse, layers, block=1),
+        integrator.integrate(coarse, layers, block=4),
+        atol=1e-9,
+    )
+
+
+def test_right_side_agrees_with_a_plain_loop(scene):
+    """The series in the kernel against the exponential of `decode_layers`."""
+    neutral, triangles, mask, coarse, _ = scene
+    layers = np.random.default_rng(6).normal(scale=0.7, size=(1, len(mask), 9))
+    integrator = LayerIntegrator(neutral, triangles, mask)
+    fast = integrator.right_side(coarse[:1], np.transpose(layers, (1, 2, 0)))[..., 0]
+    slow = np.zeros_like(neutral)
+    change = decode_layers(layers[0]) - np.eye(3)
+    for t, (corners, weights) in enumerate(zip(triangles[mask], integrator._weights, strict=True)):
+        for k in range(3):
+            i, j = corners[(k + 1) % 3], corners[(k + 2) % 3]
+            flow = weights[k] * change[t] @ (coarse[0, j] - coarse[0, i])
+            slow[j] += flow
+            slow[i] -= flow
+    np.testing.assert_allclose(fast, slow[integrator.free], atol=1e-9)
+
+
+def test_a_part_that_hangs_on_the_mask_follows_it():
+    """A hole's rim inside the mask (the inside of a mouth) goes where the mask goes."""
+    neutral, triangles, radius = sheet()
+    mask = np.flatnonzero(((radius < 60) & (radius > 14))[triangles].all(axis=1))
+    neutral = np.array(neutral)
+    layers = np.zeros((1, len(mask), 9))
+    layers[..., 3:6] = 0.1
+    corrected = LayerIntegrator(neutral, triangles, mask).integrate(neutral[None], layers)[0]
+    inside = radius < 10
+    assert np.linalg.norm(corrected - neutral, axis=1)[inside].max() > 0.2  # mm, not pinned
+    assert (
+        len(np.intersect1d(np.flatnonzero(inside), LayerIntegrator(neutral, triangles, mask).free))
+        == inside.sum()
+    )
+
+
+def test_stiffness_is_positive_and_knows_no_translation():
+    neutral, triangles, _ = sheet(8)
+    matrix = edge_stiffness(triangles, np.full((len(triangles), 3), 0.5), len(neutral)).toarray()
+    np.testing.assert_allclose(matrix @ np.ones(len(neutral)), 0, atol=1e-12)
+    assert np.linalg.eigvalsh(matrix)[0] > -1e-10
+
+
+def test_a_mask_of_the_whole_mesh_is_refused():
+    neutral, triangles, _ = sheet(6)
+    with pytest.raises(ValueError, match="nothing is left"):
+        LayerIntegrator(neutral, triangles, np.arange(len(triangles)))
+
+
+def test_layers_of_another_mask_are_refused(scene):
+    neutral, triangles, mask, coarse, _ = scene
+    with pytest.raises(ValueError, match="layers must be"):
+        LayerIntegrator(neutral, triangles, mask).integrate(coarse, np.zeros((5, 3, 9)))

@@ -1,0 +1,204 @@
+"""Regressors as maths: identities of ridge regression, selection, scikit-learn's contract."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GroupKFold
+
+from vermilion.regression.cross_validation import (
+    clips_of,
+    cross_validate_affine,
+    cross_validate_rbf,
+    target_gram,
+)
+from vermilion.regression.estimators import (
+    AffineRegressor,
+    RBFNetwork,
+    gaussian_activations,
+    temporal_prototypes,
+)
+from vermilion.regression.ridge import ridge_weights
+from vermilion.regression.scaling import feature_scale
+
+
+@pytest.fixture
+def data():
+    """Smooth features (120, 7) and outputs (120, 30) that depend on them without being linear."""
+    rng = np.random.default_rng(0)
+    features = rng.normal(size=(120, 7)).cumsum(axis=0)
+    targets = np.sin(0.3 * features @ rng.normal(size=(7, 30)))
+    return features, targets + 0.05 * rng.normal(size=targets.shape)
+
+
+def test_primal_equals_dual(data):
+    features, targets = data
+    for a, b in zip(
+        ridge_weights(features, targets, 0.3, "primal"),
+        ridge_weights(features, targets, 0.3, "dual"),
+        strict=True,
+    ):
+        np.testing.assert_allclose(a, b, atol=1e-10)
+
+
+def test_rbf_network_is_ridge_on_its_activations(data):
+    features, targets = data
+    network = RBFNetwork(alpha=0.2, beta=0.5).fit(features, targets)
+    activations = network.activations(features)
+    peer = Ridge(alpha=0.2).fit(activations, targets)
+    np.testing.assert_allclose(network.weights_, peer.coef_.T, atol=1e-8)
+    np.testing.assert_allclose(network.bias_, peer.intercept_, atol=1e-8)
+    np.testing.assert_allclose(network.predict(features), peer.predict(activations), atol=1e-9)
+
+
+def test_affine_regressor_is_ridge_on_scaled_features(data):
+    features, targets = data
+    regressor = AffineRegressor(alpha=0.7).fit(features, targets)
+    peer = Ridge(alpha=0.7).fit(regressor.scaled(features), targets)
+    np.testing.assert_allclose(
+        regressor.predict(features), peer.predict(regressor.scaled(features)), atol=1e-9
+    )
+
+
+def test_affine_regressor_without_penalty_recovers_an_affine_map(data):
+    features, _ = data
+    matrix = np.random.default_rng(2).normal(size=(7, 4))
+    targets = features @ matrix + 3.0
+    regressor = AffineRegressor(alpha=1e-10).fit(features, targets)
+    np.testing.assert_allclose(
+        regressor.predict(features[:5] + 100), (features[:5] + 100) @ matrix + 3, atol=1e-5
+    )
+
+
+def test_activation_is_one_at_the_prototype_and_follows_equation_2():
+    prototypes = np.array([[0.0, 0.0], [3.0, 4.0]])
+    np.testing.assert_allclose(
+        gaussian_activations(prototypes[:1], prototypes, 0.1), [[1.0, np.exp(-2.5)]]
+    )
+
+
+def test_order_of_rows_does_not_matter(data):
+    features, targets = data
+    prototypes = np.arange(0, 120, 10)
+    order = np.random.default_rng(1).permutation(120)
+    place = np.argsort(order)
+    plain = RBFNetwork(0.1, 0.5).fit(features, targets, prototypes=prototypes)
+    mixed = RBFNetwork(0.1, 0.5).fit(features[order], targets[order], prototypes=place[prototypes])
+    np.testing.assert_allclose(plain.weights_, mixed.weights_, atol=1e-8)
+
+
+def test_large_alpha_leaves_the_mean(data):
+    features, targets = data
+    for regressor in (RBFNetwork(alpha=1e12), AffineRegressor(alpha=1e12)):
+        predicted = regressor.fit(features, targets).predict(features[:3])
+        np.testing.assert_allclose(predicted, np.tile(targets.mean(axis=0), (3, 1)), atol=1e-8)
+
+
+def test_frames_last_is_the_same_prediction(data):
+    features, targets = data
+    network = RBFNetwork().fit(features, targets.astype(np.float32))
+    assert network.predict(features).dtype == np.float32
+    np.testing.assert_allclose(
+        network.predict_frames_last(features).T, network.predict(features), atol=1e-5
+    )
+
+
+def test_scikit_learn_contract():
+    network = clone(RBFNetwork(alpha=3.0, beta=2.0))
+    assert network.get_params()["alpha"] == 3.0
+    assert network.set_params(beta=5.0).beta == 5.0
+    with pytest.raises(ValueError, match=r"features must be \(F, 7\), got \(2, 6\)"):
+        AffineRegressor().fit(np.eye(7), np.eye(7)).predict(np.zeros((2, 6)))
+
+
+def test_scale_gives_unit_total_variance_whatever_the_number_of_features(data):
+    features, _ = data
+    for groups in (None, ["shape"] * 3 + ["distances"] * 4):
+        mean, scale = feature_scale(features, groups)
+        assert ((features - mean) / scale).var(axis=0).sum() == pytest.approx(1.0)
+
+
+def test_a_group_keeps_its_proportions_and_weighs_as_much_as_any_other(data):
+    features, _ = data
+    features = features * [1, 10, 100, 1, 1, 1, 1]
+    mean, scale = feature_scale(features, ["a", "a", "a", "b", "b", "b", "b"])
+    assert scale[0] == scale[1] == scale[2] != scale[3]
+    variance = ((features - mean) / scale).var(axis=0)
+    assert variance[:3].sum() == pytest.approx(variance[3:].sum())
+
+
+def test_a_constant_feature_says_nothing(data):
+    features, targets = data
+    features = np.column_stack([features, np.full(120, 5.0)])
+    network = RBFNetwork().fit(features, targets)
+    changed = features.copy()
+    changed[:, -1] = 1e6
+    np.testing.assert_array_equal(network.predict(changed), network.predict(features))
+
+
+def test_prototypes_are_every_tenth_frame_of_each_sequence():
+    sequences = np.repeat([4, 9], [50, 30])
+    np.testing.assert_array_equal(
+        temporal_prototypes(sequences, 10), [5, 15, 25, 35, 45, 55, 65, 75]
+    )
+
+
+def test_short_takes_get_more_prototypes():
+    assert len(temporal_prototypes(np.zeros(34), 10, minimum=20)) == 34
+    assert len(temporal_prototypes(np.zeros(45), 10, minimum=20)) == 22
+    assert len(temporal_prototypes(np.repeat([0, 1], [30, 2]), 10)) == 4  # 3 and the middle of 2
+
+
+def test_clips_are_contiguous_and_never_cross_sequences():
+    sequences = np.repeat([0, 1], [70, 31])
+    clips = clips_of(sequences, 30, 3)
+    assert np.all(np.diff(clips) >= 0)
+    assert not set(clips[:70]) & set(clips[70:])
+    assert len(np.unique(clips_of(np.zeros(9), 30, 5))) >= 5
+
+
+def test_cross_validation_equals_fitting_and_predicting(data):
+    features, targets = data
+    sequences, weights = np.repeat([0, 1], 60), np.linspace(0.5, 2.0, 30)
+    clips = clips_of(sequences, 15, 5)
+    alphas, betas = [1e-4, 1e-2, 10.0], [0.1, 3.0]
+    groups = ["a"] * 3 + ["b"] * 4
+    curve = cross_validate_rbf(
+        features, target_gram(targets, weights), weights.sum(), sequences, clips,
+        alphas=alphas, betas=betas, feature_groups=groups,
+    )  # fmt: skip
+    affine = cross_validate_affine(
+        features, target_gram(targets, weights), weights.sum(), clips, alphas=alphas
+    )
+    for k, (train, held) in enumerate(GroupKFold(5).split(clips, groups=clips)):
+
+        def error(regressor, train=train, held=held):
+            fitted = regressor.fit(features[train], targets[train], sequences[train])
+            squares = (fitted.predict(features[held]) - targets[held]) ** 2
+            return np.sqrt((squares @ weights).sum() / (len(held) * weights.sum()))
+
+        for j, alpha in enumerate(alphas):
+            for i, beta in enumerate(betas):
+                plain = error(RBFNetwork(alpha, beta, feature_groups=groups))
+                assert curve.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
+            assert affine.errors[0, j, k] == pytest.approx(error(AffineRegressor(alpha)), rel=1e-5)
+
+
+def test_choice_takes_the_smoothest_within_one_standard_error(data):
+    features, targets = data
+    clips = clips_of(np.zeros(120), 15, 5)
+    curve = cross_validate_affine(
+        features, target_gram(targets), 30, clips, alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3]
+    )
+    least, simplest = curve.choose("least"), curve.choose("simplest")
+    assert curve.mean[least] == curve.mean.min()
+    assert curve.freedom[simplest] <= curve.freedom[least]
+    assert curve.mean[simplest] <= curve.mean[least] + curve.standard_error[least]
+    # Freedom falls as alpha grows, from the number of features to none.
+    assert np.all(np.diff(curve.freedom[0]) < 0)
+    assert curve.freedom[0, 0] < 7
+
+
+def test_ridge_needs_a_positive_parameter(data):
+    with pytest.raises(ValueError, match="alpha must be positive"):
+        ridge_weights(*data, 0.0)
