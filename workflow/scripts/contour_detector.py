@@ -26,7 +26,12 @@ def main(snakemake) -> None:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
     else:
         detector = LandmarkRidgeDetector(
-            cfg.interocular_size_px, cfg.margin, cfg.ridge_width, cfg.sharpening
+            cfg.interocular_size_px,
+            cfg.margin,
+            cfg.ridge_width,
+            cfg.ridge_reach,
+            cfg.edge_weight,
+            cfg.stiffness,
         )
     detector.save(snakemake.output.detector)
     print(f"{type(detector).__name__} from {len(labelled)} labelled frames")

@@ -32,7 +32,7 @@ class ContourDetectorConfig(StageConfig):
     kind: Literal["auto", "boosted", "landmarks"] = Field(
         "auto",
         description="`boosted`: edge learning, trained on the take's labelled frames. `landmarks`: "
-        "ridges along the landmarks' lips, sharpened by edges. `auto`: boosted where the take has "
+        "ridges at the border of the lips' colour near the landmarks. `auto`: boosted where the take has "
         "labelled frames in the monocular camera, else landmarks.",
     )
     interocular_size_px: float = Field(
@@ -75,13 +75,28 @@ class ContourDetectorConfig(StageConfig):
         1.0, gt=0, le=5, description="Deviation of the Gaussian on the maps (region pixels)."
     )
     ridge_width: float = Field(
-        0.022,
+        0.008,
         gt=0,
         le=0.2,
         description="`landmarks`: deviation of the ridges (per inter-ocular distance).",
     )
-    sharpening: float = Field(
-        0.7, ge=0, le=1, description="`landmarks`: share of a ridge that needs an image edge."
+    ridge_reach: float = Field(
+        0.08,
+        gt=0,
+        le=0.3,
+        description="`landmarks`: how far from the landmarks the lips' border is looked for (per "
+        "inter-ocular distance).",
+    )
+    edge_weight: float = Field(
+        4.0,
+        ge=0,
+        description="`landmarks`: worth of the strongest edge against a border one reach away from "
+        "the landmarks; 0 draws the landmarks alone.",
+    )
+    stiffness: float = Field(
+        6.0,
+        ge=0,
+        description="`landmarks`: cost of a slope of 1 between the border and the landmarks' curve.",
     )
     boosting: BoostingConfig = Field(
         default_factory=BoostingConfig, description="Boosted trees of the detectors."

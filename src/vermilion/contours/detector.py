@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
@@ -141,5 +142,5 @@ def load_detector(path: str | Path) -> ContourDetector:
         if kind == "boosted" and tuple(arrays["channels"]) != CHANNELS:
             raise ModelFileError("other image channels", expected, hint, path=path)
         return kinds[kind](arrays)
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise ModelFileError(f"an unreadable file ({error})", expected, hint, path=path) from error

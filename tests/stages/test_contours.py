@@ -1,0 +1,205 @@
+"""The contours and features stages on a tiny capture: their scripts from files to files."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.stages.run_script import run_script
+from tests.unit.mouths import draw_mouth, facing_camera, mouth_model
+from vermilion.contours.maps import read_maps
+from vermilion.features.vector import FeatureTable
+from vermilion.images import write_image
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.sequences import write_sequence
+from vermilion.tables import read_table
+
+SHAPES = [(2.0, 20.0), (12.0, 28.0), (7.0, 24.0), (9.0, 26.0), (5.0, 22.0)]  # opening, height
+LABELLED = (0, 1, 2)
+UNREADABLE = 4
+FRAMES = list(range(len(SHAPES)))
+CFG = {
+    "contours.detector": {
+        "features": 400,
+        "variants": 2,
+        "max_samples": 6000,
+        "boosting": {"trees": 48, "features_per_tree": 64},
+    },
+    "contours.maps": {},
+    "features.shape": {},
+    "features.contours": {},
+}
+NAME = {"subject": "s1", "take": "phone"}
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """Five frames of a drawn mouth, three of them labelled, one damaged, and its coarse track."""
+    root = tmp_path_factory.mktemp("contours")
+    capture = root / "capture"
+    points = []
+    for frame, (opening, height) in enumerate(SHAPES):
+        picture, landmarks, label = draw_mouth(opening, height, seed=frame)
+        points.append(landmarks)
+        path = capture / f"frames/cam/{frame:06d}.png"
+        write_image(path, picture)
+        if frame == UNREADABLE:
+            path.write_bytes(path.read_bytes()[:500])
+        if frame in LABELLED:
+            lines = {
+                name: {"closed": True, "points": getattr(label, name).points_px.tolist()}
+                for name in ("inner", "outer")
+            }
+            path = capture / f"labels/contours/cam/{frame:06d}.json"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps({"unit": "px", **lines}))
+    n = len(FRAMES)
+    LandmarkTrack(np.arange(n), np.stack(points), np.ones((n, 66)), np.ones(n, dtype=bool)).save(
+        root / "landmarks.npz"
+    )
+    _write_track(root, n)
+    params = {
+        "cfg": CFG,
+        "source": str(capture),
+        "capture": str(capture),
+        "camera": "cam",
+        "frames": FRAMES,
+    }
+    run_script(
+        "contour_detector",
+        wildcards=NAME,
+        params=params,
+        input={"landmarks": [root / "landmarks.npz"]},
+        output={"detector": root / "detector.npz"},
+    )
+    run_stages(root, params, "000000-000004", FRAMES)
+    return root, params
+
+
+def _write_track(root, n) -> None:
+    from vermilion.tracking.expression import HeadMotion
+    from vermilion.tracking.result import Identity, TrackedTake
+
+    model, camera = mouth_model(8.0, 24.0), facing_camera()
+    model.save(root / "tracker.npz")
+    motion = HeadMotion(
+        rotation=np.tile(np.diag([1.0, -1.0, -1.0]), (n, 1, 1)),
+        translation_mm=np.tile([0.0, 0.0, 1000.0], (n, 1)),
+        weights=np.zeros((n, 3)),
+        reprojection_px=np.zeros(n),
+    )
+    fit = TrackedTake.of(np.arange(n), motion, np.ones(n, dtype=bool), camera, model)
+    fit.save(root / "fit.npz")
+    identity = Identity(
+        identity=np.zeros(0),
+        neutral_mm=model.neutral_mm,
+        landmark_offset_mm=np.zeros((66, 3)),
+        takes=np.array(["phone"]),
+        focal_px=np.array([1000.0]),
+        calibrated=np.array([True]),
+    )
+    identity.save(root / "identity.npz")
+
+
+def run_stages(root, params, chunk, frames) -> None:
+    """Maps and features of one chunk of the take."""
+    track = LandmarkTrack.load(root / "landmarks.npz")
+    rows = np.isin(track.frames, frames)
+    LandmarkTrack(
+        track.frames[rows], track.points_px[rows], track.confidence[rows], track.valid[rows]
+    ).save(root / chunk / "landmarks.npz")
+    coarse = np.tile(mouth_model(8.0, 24.0).neutral_mm, (len(frames), 1, 1))
+    write_sequence(root / chunk / "C.npy", coarse)
+    run_script(
+        "contours",
+        wildcards=NAME,
+        params=params,
+        input={
+            "landmarks": root / chunk / "landmarks.npz",
+            "detector": root / "detector.npz",
+        },
+        output={
+            "maps": root / chunk / "maps",
+            "quality": root / chunk / "contours.tsv",
+            "overlay": root / chunk / "contours.png",
+        },
+    )
+    run_script(
+        "features",
+        wildcards=NAME,
+        params={**params, "frames": frames},
+        input={
+            "model": root / "tracker.npz",
+            "identity": root / "identity.npz",
+            "fit": root / "fit.npz",
+            "coarse": root / chunk / "C.npy",
+            "maps": root / chunk / "maps",
+        },
+        output={
+            "features": root / chunk / "features.npz",
+            "quality": root / chunk / "features.tsv",
+            "overlay": root / chunk / "features.png",
+        },
+    )
+
+
+def test_the_unlabelled_frame_has_its_true_distances(take):
+    root, _ = take
+    table = FeatureTable.load(root / "000000-000004/features.npz")
+    value = dict(zip(table.names, table.features[3], strict=True))
+    tolerance = 2.0 / 200  # 2 px
+    assert value["outer_width"] == pytest.approx(104 / 200, abs=2 * tolerance)
+    assert value["outer_height_5"] == pytest.approx(52 / 200, abs=tolerance)
+    assert value["upper_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
+    assert value["lower_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
+
+
+def test_a_frame_that_cannot_be_read_is_flagged_and_the_others_go_on(take):
+    root, _ = take
+    for name in ("contours", "features"):
+        table = read_table(root / f"000000-000004/{name}.tsv")
+        assert table["valid"].tolist() == [1, 1, 1, 1, 0]
+    assert "unreadable" in read_table(root / "000000-000004/contours.tsv")["reason"][4]
+    assert not (root / "000000-000004/maps" / f"{UNREADABLE:06d}.exr").exists()
+    features = FeatureTable.load(root / "000000-000004/features.npz")
+    assert features.valid.tolist() == [True] * 4 + [False]
+    assert np.isfinite(features.features).all()
+
+
+def test_maps_have_the_pictures_size_and_lie_in_range(take):
+    root, _ = take
+    inner, outer = read_maps(root / "000000-000004/maps/000003.exr")
+    assert inner.shape == outer.shape == (240, 240)
+    for plane in (inner, outer):
+        assert plane.min() >= 0
+        assert 0.4 < plane.max() <= 1
+
+
+def test_chunks_change_nothing(take):
+    root, params = take
+    run_stages(root, params, "000002-000003", [2, 3])
+    whole = FeatureTable.load(root / "000000-000004/features.npz")
+    part = FeatureTable.load(root / "000002-000003/features.npz")
+    np.testing.assert_array_equal(part.features, whole.features[2:4])
+    np.testing.assert_array_equal(part.inner_px, whole.inner_px[2:4])
+
+
+def test_without_labels_auto_falls_back_and_boosted_says_what_is_missing(take, tmp_path):
+    from vermilion.contours.detector import load_detector
+    from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+    from vermilion.errors import InputError
+
+    root, params = take
+    job = {
+        "wildcards": NAME,
+        "input": {"landmarks": [root / "landmarks.npz"]},
+        "output": {"detector": tmp_path / "detector.npz"},
+    }
+    bare = {**params, "capture": str(tmp_path)}
+    run_script("contour_detector", params=bare, **job)
+    assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)
+    demanding = {**bare, "cfg": {"contours.detector": {"kind": "boosted"}}}
+    with pytest.raises(InputError, match="no usable contour labels"):
+        run_script("contour_detector", params=demanding, **job)
