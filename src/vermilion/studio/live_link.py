@@ -11,6 +11,8 @@ from vermilion.errors import InputError
 
 #: ARKit shapes without a side that models may split in two.
 SPLIT = ("browInnerUp", "cheekPuff")
+#: A column without which the file holds no ARKit weights.
+OPENING_COLUMN = "jawOpen"
 
 
 def arkit_name(column: str) -> str:
@@ -78,6 +80,3 @@ def read_live_link(
             values = pd.to_numeric(columns[name], errors="coerce").fillna(0.0).to_numpy()
             weights[:, k] = np.interp(rows, index, values)
     return np.clip(weights, 0.0, 1.0)
-
-
-OPENING_COLUMN = "jawOpen"
