@@ -87,7 +87,7 @@ def test_matched_points_lie_on_the_plane_with_its_normal():
     assert np.median(cloud.normals @ normal) > 0.95
     fused = fuse(cloud, 2.0)
     assert np.median(np.abs(fused.points_mm @ normal)) < 0.08 * mm_per_px
-    assert np.median(fused.normals @ normal) > 0.999
+    assert np.median(fused.normals @ normal) > 0.995  # 6 degrees
 
 
 def sheet(n=31, size_mm=60.0):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.files import atomic_path
-from vermilion.mesh import Mesh, vertex_normals
+from vermilion.mesh import Mesh, normalised, vertex_normals
 from vermilion.multiview.stereo import Cloud
 
 
@@ -44,6 +44,7 @@ def fuse(cloud: Cloud, spacing_mm: float, neighbours: int = 40, rounds: int = 2)
     """
     if len(cloud) < neighbours:
         return cloud
+    cloud = thinned(cloud, spacing_mm / 2)  # so that the neighbours fill the Gaussian
     voxel = np.floor(cloud.points_mm / spacing_mm).astype(np.int64)
     _, first = np.unique(voxel, axis=0, return_index=True)
     seeds = cloud.select(np.sort(first))
@@ -70,6 +71,24 @@ def fuse(cloud: Cloud, spacing_mm: float, neighbours: int = 40, rounds: int = 2)
         points = points + ((mean - points) * plane).sum(axis=1)[:, None] * plane
         points, normals, total = points[supported], plane[supported], total[supported]
     return Cloud(points, normals, 1.0 / np.sqrt(total))
+
+
+def thinned(cloud: Cloud, spacing_mm: float) -> Cloud:
+    """The mean point and normal of each voxel, weighted by 1 / sigma^2."""
+    voxel = np.floor(cloud.points_mm / spacing_mm).astype(np.int64)
+    _, inverse = np.unique(voxel, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    weight = 1.0 / cloud.sigma_mm**2
+    total = np.bincount(inverse, weight)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        sums = [np.bincount(inverse, weight * values[:, k]) for k in range(3)]
+        return np.stack(sums, axis=1) / total[:, None]
+
+    count = np.bincount(inverse)
+    normals = normalised(mean(cloud.normals))
+    # matched pixels share errors, so that a voxel is not surer by the root of its count
+    return Cloud(mean(cloud.points_mm), normals, np.sqrt(count / total))
 
 
 def screened_poisson(cloud: Cloud, depth: int, trim_mm: float) -> Mesh:

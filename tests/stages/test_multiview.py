@@ -1,0 +1,191 @@
+"""The multiview stage on a tiny capture of three cameras: its scripts from files to files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from tests import lip_patch
+from tests.stages.run_script import run_script
+from vermilion.camera import write_cameras
+from vermilion.config.multiview import MultiviewConfig
+from vermilion.images import image_size, write_image
+from vermilion.mesh import vertex_normals
+from vermilion.sequences import read_mesh, read_sequence
+from vermilion.tables import read_table
+
+POSES = [(0.0, 0.0), (0.7, 0.02), (1.5, 0.05), (2.2, 0.1)]
+LOST = {(2, "left")}  # a frame that a camera misses
+PLACE = {"subject": "s1", "take": "rom"}
+
+#: Sizes for pictures of 240 x 180; the sheet is small, so that little of it is hidden.
+SETTINGS = MultiviewConfig(
+    stereo={"reach_mm": 30, "speckle_px": 50},
+    neutral={"first_gate_mm": 6, "last_gate_mm": 2, "rounds": 5, "poisson_depth": 6},
+    track={"scale": 1.0},
+    refine={"scales": [1.0, 1.0], "cloud_scale": 1.0},
+)
+CFG = {f"multiview.{key}": value for key, value in SETTINGS.model_dump(mode="json").items()}
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """A take of four frames, and the files that the stage reads; the template is of another face."""
+    root = tmp_path_factory.mktemp("multiview")
+    person, rig = lip_patch.face_model(), lip_patch.cameras()
+    write_cameras(root / "cameras", rig)
+    for frame, pose in enumerate(POSES):
+        vertices = lip_patch.vertices_at(*pose)
+        for name, camera in rig.items():
+            if (frame, name) not in LOST:
+                picture = lip_patch.render(person, vertices, camera, tattoo=True)
+                write_image(root / f"rom/frames/{name}/{frame:06d}.png", picture)
+    rows = np.repeat([lip_patch.LIP_ROWS, 19, 26], 22)
+    columns = np.tile(np.linspace(0, lip_patch.COLUMNS, 22, endpoint=False).astype(int), 3)
+    landmarks = (rows * lip_patch.COLUMNS + columns).astype(np.int32)
+    wrong = person.neutral_mm * [1.04, 0.97, 1.1] + [0.3, -0.2, 0.5]
+    replace(person, neutral_mm=wrong, landmarks=landmarks).save(root / "template.npz")
+    noise = np.random.default_rng(0).normal(0, 0.5, (len(rig), 66, 2))
+    points = np.stack([c.project(person.neutral_mm[landmarks]) for c in rig.values()]) + noise
+    confidence = np.full((len(rig), 66), 0.9)
+    np.savez(
+        root / "views.npz", cameras=np.array(list(rig)), points_px=points, confidence=confidence
+    )
+    neutral(root)
+    track(root)
+    refine(root, [0, 1, 2, 3], "000000-000003")
+    return root
+
+
+def inputs(root):
+    return {
+        "template": root / "template.npz",
+        "cameras": root / "cameras",
+        "landmarks": root / "views.npz",
+        "neutral": root / "neutral.npz",
+        "track": root / "track.npz",
+    }
+
+
+def neutral(root):
+    run_script(
+        "multiview_neutral",
+        wildcards=PLACE,
+        params={"cfg": CFG, "source": str(root / "rom"), "frame": 0},
+        input=inputs(root),
+        output={
+            "neutral": root / "neutral.npz",
+            "cloud": root / "cloud_neutral.ply",
+            "overlay": root / "neutral.png",
+        },
+    )
+
+
+def track(root):
+    run_script(
+        "multiview_track",
+        wildcards=PLACE,
+        params={"cfg": CFG, "source": str(root / "rom"), "frames": [0, 3]},
+        input=inputs(root),
+        output={"track": root / "track.npz", "topology": root / "topology.ply"},
+    )
+
+
+def refine(root, frames, chunk, source="rom"):
+    run_script(
+        "multiview_refine",
+        wildcards={**PLACE, "chunk": chunk},
+        params={"cfg": CFG, "source": str(root / source), "neutral": 0, "frames": frames},
+        input=inputs(root),
+        output={
+            "meshes": root / f"H/{chunk}.npy",
+            "visibility": root / f"visibility/{chunk}.npy",
+            "quality": root / f"quality/{chunk}.tsv",
+            "overlay": root / f"overlay/{chunk}.png",
+        },
+    )
+
+
+def surface_error_mm(vertices, pose):
+    """Distance of true vertices of the lips and skin to the mesh, along its normals."""
+    model = lip_patch.face_model()
+    truth = lip_patch.vertices_at(*pose)
+    shown = ~model.regions["mouth_inner"] & (np.arange(len(truth)) < 26 * lip_patch.COLUMNS)
+    normals = vertex_normals(vertices, model.triangles)
+    _, near = cKDTree(vertices).query(truth[shown])
+    return np.abs(((truth[shown] - vertices[near]) * normals[near]).sum(axis=1))
+
+
+def test_the_neutral_lies_on_the_true_surface(take):
+    vertices = np.load(take / "neutral.npz")["vertices_mm"]
+    error = surface_error_mm(vertices, POSES[0])
+    assert np.median(error) < 0.1
+    assert np.percentile(error, 95) < 0.5
+    assert (take / "cloud_neutral.ply").stat().st_size > 10_000
+    assert image_size(take / "neutral.png")[0] > 240
+
+
+def test_every_frame_lies_on_the_true_surface(take):
+    meshes = read_sequence(take / "H/000000-000003.npy")
+    assert meshes.dtype == np.float32
+    for vertices, pose in zip(meshes, POSES, strict=True):
+        error = surface_error_mm(vertices.astype(float), pose)
+        assert np.median(error) < 0.15
+        assert np.percentile(error, 95) < 0.8
+
+
+def test_vertices_stay_on_their_material_points(take):
+    meshes = read_sequence(take / "H/000000-000003.npy").astype(float)
+    model = lip_patch.face_model()
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+    rest = lip_patch.vertices_at(*POSES[0])
+    _, near = cKDTree(rest).query(meshes[0])
+    for vertices, pose in zip(meshes, POSES, strict=True):
+        motion = (lip_patch.vertices_at(*pose) - rest)[near]
+        drift = np.linalg.norm(vertices - meshes[0] - motion, axis=1)[lips]
+        assert drift.mean() < 0.4
+
+
+def test_topology_and_visibility_lie_beside_the_meshes(take):
+    topology = read_mesh(take / "topology.ply")
+    assert np.array_equal(topology.triangles, lip_patch.face_model().triangles)
+    seen = np.load(take / "visibility/000000-000003.npy")
+    assert seen.shape == (4, len(topology.vertices_mm))
+    lips = lip_patch.face_model().regions["vermilion_lower"]
+    assert (seen[:, lips] > 0).mean() > 0.5
+    assert seen.max() <= 3
+
+
+def test_a_camera_that_misses_a_frame_is_named_and_the_frame_kept(take):
+    table = read_table(take / "quality/000000-000003.tsv")
+    assert table["valid"].tolist() == [1, 1, 1, 1]
+    assert table["missing_cameras"].tolist() == [0, 0, 1, 0]
+    assert "camera left" in table["reason"][2]
+    assert (table["residual_px"] < 1).all()
+    assert (table["cloud_distance_mm"] < 0.5).all()
+    assert (table["contact_left_mm"] < 0.1).all()
+
+
+def test_chunk_size_changes_nothing(take):
+    whole = read_sequence(take / "H/000000-000003.npy")
+    refine(take, [2, 3], "000002-000003")
+    assert np.array_equal(read_sequence(take / "H/000002-000003.npy"), whole[2:])
+
+
+def test_an_unreadable_frame_is_flagged_and_the_rest_go_on(take):
+    (take / "torn/frames").mkdir(parents=True)
+    for camera in lip_patch.cameras():
+        folder = take / f"torn/frames/{camera}"
+        folder.mkdir()
+        for path in (take / f"rom/frames/{camera}").iterdir():
+            whole = path.read_bytes()
+            torn = path.stem == "000001"
+            (folder / path.name).write_bytes(whole[: len(whole) // 3] if torn else whole)
+    refine(take, [1, 2], "000001-000002", source="torn")
+    table = read_table(take / "quality/000001-000002.tsv")
+    assert table["valid"].tolist() == [0, 1]
+    assert "0 readable pictures" in table["reason"][0]
+    assert np.isfinite(read_sequence(take / "H/000001-000002.npy")).all()
