@@ -4,8 +4,8 @@ from vermilion.logfile import log_to
 from vermilion.sequences import write_sequence
 from vermilion.tracking.external import read_tracked
 
-if __name__ == "__main__":
-    log_to(snakemake.log[0])
+
+def main(snakemake):
     sequence = read_tracked(
         snakemake.input.source,
         snakemake.params.frames,
@@ -14,3 +14,8 @@ if __name__ == "__main__":
         take=snakemake.wildcards.take,
     )
     write_sequence(snakemake.output.meshes, sequence.vertices_mm)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -5,8 +5,8 @@ from vermilion.mesh import Mesh
 from vermilion.sequences import write_ply
 from vermilion.tracking.external import read_tracked
 
-if __name__ == "__main__":
-    log_to(snakemake.log[0])
+
+def main(snakemake):
     sequence = read_tracked(
         snakemake.input.source,
         [snakemake.params.first],
@@ -15,3 +15,8 @@ if __name__ == "__main__":
         take=snakemake.wildcards.take,
     )
     write_ply(snakemake.output[0], Mesh(sequence.vertices_mm[0], sequence.triangles))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -6,8 +6,13 @@ from vermilion.mesh import Mesh
 from vermilion.sequences import write_ply
 from vermilion.tracking.result import Identity
 
-if __name__ == "__main__":
-    log_to(snakemake.log[0])
+
+def main(snakemake):
     tracker = FaceModel.load(snakemake.input.tracker)
     neutral = Identity.load(snakemake.input.identity).neutral_mm
     write_ply(snakemake.output[0], Mesh(neutral, tracker.triangles))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,128 @@
+"""The landmarks stage on a tiny capture of drawn faces."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.stages.run_script import run_script
+from tests.unit.test_landmark_descent import drawn_face
+from vermilion.camera import pinhole, write_cameras
+from vermilion.config.landmarks import LandmarksConfig
+from vermilion.images import read_image, write_image
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.scheme import face_size_px
+from vermilion.landmarks.views import LandmarkViews
+from vermilion.tables import read_table
+
+pytestmark = pytest.mark.slow
+N_LABELLED, N_FRAMES = 20, 4
+
+
+def section(**changes):
+    return LandmarksConfig(training_takes=["a/b"], **changes).model_dump(mode="json")
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    """A trained model, a capture with frame 2 damaged, and its true landmarks."""
+    root = tmp_path_factory.mktemp("landmarks")
+    rng = np.random.default_rng(4)
+    labels = root / "people" / "labels" / "landmarks" / "cam"
+    labels.mkdir(parents=True)
+    for frame in range(N_LABELLED):
+        picture, points = drawn_face(rng)
+        write_image(root / "people" / "frames" / "cam" / f"{frame:06d}.png", picture)
+        text = json.dumps({"unit": "px", "points": points.tolist()})
+        (labels / f"{frame:06d}.json").write_text(text)
+    truth = []
+    for frame in range(N_FRAMES):
+        picture, points = drawn_face(rng)
+        write_image(root / "take" / "frames" / "cam" / f"{frame:06d}.png", picture)
+        truth.append(points)
+    write_image(root / "take" / "frames" / "empty" / "000000.png", np.full((60, 80, 3), 0.3))
+    damaged = root / "take" / "frames" / "cam" / "000002.png"
+    damaged.write_bytes(damaged.read_bytes()[:400])
+    training = section()["training"] | {"stages": 3, "perturbations": 3}
+    run_script(
+        "landmark_model",
+        params={
+            "cfg": {"landmarks.training": training},
+            "takes": [{"subject": "a", "take": "b", "source": str(root / "people")}],
+        },
+        output={"model": root / "model.npz", "overlay": root / "model.png"},
+    )
+    return root, np.array(truth)
+
+
+def parameters(root, detector="trained", **csv):
+    values = section(detector=detector, csv=csv)
+    return {
+        "cfg": {f"landmarks.{key}": values[key] for key in ("detector", "networks", "csv")},
+        "source": str(root / "take"),
+        "model": str(root / "model.npz"),
+    }
+
+
+def find(root, frames, params, **inputs):
+    run_script(
+        "landmarks",
+        wildcards={"subject": "a", "take": "t"},
+        params=params | {"camera": "cam", "frames": frames},
+        input=inputs,
+        output={
+            "landmarks": root / "out.npz",
+            "quality": root / "out.tsv",
+            "overlay": root / "out.png",
+        },
+    )
+    return LandmarkTrack.load(root / "out.npz"), read_table(root / "out.tsv")
+
+
+def test_landmarks_are_found_and_a_damaged_picture_is_flagged(stage):
+    root, truth = stage
+    track, quality = find(root, list(range(N_FRAMES)), parameters(root))
+    good = [0, 1, 3]
+    assert list(track.frames[track.valid]) == good
+    error = np.linalg.norm(track.points_px[good] - truth[good], axis=-1).mean(axis=1)
+    assert (error < 0.05 * face_size_px(truth[good])).all()
+    assert list(quality["valid"]) == [1, 1, 0, 1]
+    assert "000002.png" in quality["reason"][2]
+    assert read_image(root / "out.png").shape[0] > 100
+
+
+def test_landmarks_do_not_depend_on_chunks(stage):
+    root, _ = stage
+    whole, _ = find(root, [0, 1, 3], parameters(root))
+    parts = [find(root, [frame], parameters(root))[0] for frame in (0, 1, 3)]
+    assert np.array_equal(whole.points_px, np.concatenate([part.points_px for part in parts]))
+
+
+def test_landmarks_of_another_tracker_are_taken_from_its_file(stage):
+    root, truth = stage
+    header = ["frame", *(f"x_{k}" for k in range(66)), *(f"y_{k}" for k in range(66))]
+    rows = [[f + 1, *(truth[f].T.reshape(-1) - 0.5)] for f in (0, 1)]
+    path = root / "t.csv"
+    path.write_text("\n".join(",".join(map(str, row)) for row in [header, *rows]))
+    params = parameters(root, "csv", path=str(path))
+    track, quality = find(root, [0, 1, 3], params, csv=path)
+    assert np.allclose(track.points_px[:2], truth[:2])
+    assert list(track.valid) == [True, True, False]
+    assert quality["reason"][2] == "no face found"
+
+
+def test_views_hold_the_cameras_that_see_a_face(stage):
+    root, truth = stage
+    cameras = {name: pinhole(name, 400.0, 180, 150) for name in ("cam", "empty")}
+    write_cameras(root / "cameras", cameras)
+    run_script(
+        "landmarks_views",
+        wildcards={"subject": "a", "take": "t"},
+        params=parameters(root) | {"frame": 0, "csv": ""},
+        input={"cameras": root / "cameras"},
+        output={"views": root / "views.npz", "overlay": root / "views.png"},
+    )
+    views = LandmarkViews.load(root / "views.npz")
+    assert list(views.cameras) == ["cam"]
+    error = np.linalg.norm(views.points_px[0] - truth[0], axis=-1).mean()
+    assert error < 0.05 * face_size_px(truth[0])
