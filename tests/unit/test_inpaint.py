@@ -93,6 +93,19 @@ def test_the_domain_is_the_lips_and_what_is_near(model, domain):
     assert domain.inner.any() and (domain.lip_distance_mm[domain.inner] < 4.5).all()
 
 
+def test_distances_are_lengths_on_the_skin_whatever_the_chart(domain):
+    y, x = np.argwhere(domain.valid & (domain.lip_distance_mm > 4.0))[0]
+    source = np.zeros(domain.shape, dtype=bool)
+    source[y, x] = True
+    distance = domain.distance_mm(source, 6.0)
+    straight = np.linalg.norm(domain.position_mm - domain.position_mm[y, x], axis=2)
+    near = np.isfinite(distance) & (straight > 1.0)
+    assert near.sum() > 50
+    assert (distance[near] >= straight[near] - 1e-3).all()
+    assert np.median(distance[near] / straight[near]) < 1.12
+    assert np.isinf(domain.distance_mm(np.zeros(domain.shape, bool), 6.0)).all()
+
+
 def test_a_model_without_lips_is_refused(model):
     regions = {name: np.zeros(model.n_vertices, dtype=bool) for name in model.regions}
     blank = type(model)(**{**model.__dict__, "regions": regions})
@@ -152,7 +165,7 @@ def test_without_a_tattoo_only_the_lips_are_painted(domain, textures):
 def test_the_feather_falls_from_one_to_zero_over_its_width(domain):
     mask = domain.valid & (domain.lip_distance_mm < 1.0)
     opacity = feathered(domain, mask, border_mm=1.0, feather_mm=2.0)
-    distance = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5) * domain.texel_mm
+    distance = domain.distance_mm(mask, 10.0)
     assert (opacity[domain.valid & (distance < 1.0)] == 1).all()
     assert (opacity[distance > 3.01] == 0).all()
     middle = opacity[domain.valid & (np.abs(distance - 2.0) < 0.1)]
@@ -176,9 +189,9 @@ def test_the_change_of_light_is_found_whatever_the_tattoo(domain):
 
 def test_bare_skin_keeps_its_distance(domain, opacity):
     bare = bare_skin(domain, opacity, 1.0)
-    painted = cv2.distanceTransform((opacity <= 0).astype(np.uint8), cv2.DIST_L2, 5)
+    painted = domain.distance_mm(opacity > 0, 10.0)
     assert bare.any() and not bare[domain.inner].any()
-    assert painted[bare].min() * domain.texel_mm > 1.0
+    assert painted[bare].min() > 1.0
 
 
 # Compositing

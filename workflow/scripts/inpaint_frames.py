@@ -29,10 +29,13 @@ def paint_of(snakemake, model, place):
     domain = lip_domain(model, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
     plain, _ = read_texture(snakemake.input.plain, domain, **place)
     reference, more = read_texture(snakemake.input.reference, domain, **place)
-    return Paint(
-        domain, plain, reference, more["opacity"], Shading(**shading.model_dump()),
-        cfg.edge_mm, how.lens_px, how.rim_px, how.samples, how.grain,
-    ), how.seed  # fmt: skip
+    light = shading.model_dump()
+    gap_mm = light.pop("gap_mm")
+    paint = Paint(
+        domain, plain, reference, more["opacity"], Shading(**light), cfg.edge_mm,
+        how.lens_px, how.rim_px, how.samples, how.grain, gap_mm,
+    )  # fmt: skip
+    return paint, how.seed
 
 
 def main(snakemake):

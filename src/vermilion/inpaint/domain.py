@@ -7,6 +7,7 @@ subject in the same topology.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -17,8 +18,9 @@ from vermilion.faces.model import FaceModel
 from vermilion.mesh import triangle_areas, unique_edges
 from vermilion.raycast import RayCaster
 
-#: A chart may stretch a triangle this much more or less than the lips; beyond it is a seam.
-_STRETCH_LIMIT = 30.0
+#: A chart may stretch an edge, or shrink a triangle, this much against the lips; else it is a seam.
+_STRETCH_LIMIT = 20.0
+_SHRINK_LIMIT = 30.0
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class LipDomain:
         barycentric: (h, w, 3) float32 at each texel.
         lip_distance_mm: (h, w) float32 distance to the vermilion along the skin; 0 on it.
         inner: (h, w) bool, the inside of the lips, past the vermilion.
+        position_mm: (h, w, 3) float32 place on the template's neutral.
         texel_mm: median edge of a texel on the template's neutral.
     """
 
@@ -45,6 +48,7 @@ class LipDomain:
     barycentric: np.ndarray
     lip_distance_mm: np.ndarray
     inner: np.ndarray
+    position_mm: np.ndarray
     texel_mm: float
 
     @property
@@ -55,6 +59,41 @@ class LipDomain:
     def valid(self) -> np.ndarray:
         """(h, w) bool, texels that lie on the mesh."""
         return self.triangle >= 0
+
+    def distance_mm(self, mask: np.ndarray, limit_mm: float) -> np.ndarray:
+        """Distance along the surface to the texels of a mask, (h, w); infinite beyond the limit.
+
+        A chart stretches the corners of the mouth: texels are no measure of length there.
+        """
+        distance = np.full(self.shape, np.inf, dtype=np.float32)
+        sources = self._node[mask & self.valid]
+        if len(sources):
+            distance[self.valid] = csgraph.dijkstra(
+                self._graph, directed=False, indices=sources, min_only=True, limit=limit_mm
+            )
+        return distance
+
+    @cached_property
+    def _node(self) -> np.ndarray:
+        """Number of each valid texel, (h, w), -1 elsewhere."""
+        return np.where(self.valid, np.cumsum(self.valid).reshape(self.shape) - 1, -1)
+
+    @cached_property
+    def _graph(self) -> sparse.csr_matrix:
+        """Each valid texel joined to its eight neighbours, weights in millimetres."""
+        rows, columns, lengths = [], [], []
+        height, width = self.shape
+        for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            here = (slice(0, height - dy), slice(max(0, -dx), width - max(0, dx)))
+            there = (slice(dy, height), slice(max(0, dx), width - max(0, -dx)))
+            both = self.valid[here] & self.valid[there]
+            rows.append(self._node[here][both])
+            columns.append(self._node[there][both])
+            step = self.position_mm[here][both] - self.position_mm[there][both]
+            lengths.append(np.maximum(np.linalg.norm(step, axis=1), 1e-6))
+        size = (int(self.valid.sum()),) * 2
+        joined = (np.concatenate(rows), np.concatenate(columns))
+        return sparse.csr_matrix((np.concatenate(lengths), joined), shape=size)
 
     def texels(self) -> tuple[np.ndarray, np.ndarray]:
         """Triangle (n,) and barycentric weights (n, 3) of the valid texels, row by row."""
@@ -110,6 +149,7 @@ def lip_domain(model: FaceModel, skin_mm: float, inner_mm: float, texel_mm: floa
         barycentric,
         lip_distance.astype(np.float32),
         inner & (triangle >= 0),
+        (model.neutral_mm[corners] * barycentric[..., None]).sum(axis=-2).astype(np.float32),
         texel_mm,
     )
 
@@ -140,14 +180,23 @@ def _charted(model: FaceModel, candidates: np.ndarray, vermilion: np.ndarray) ->
             "a chart over the lips",
             "Give the template texture coordinates.",
         )
-    relative = density / typical
-    sane = candidates & (relative > 1 / _STRETCH_LIMIT) & (relative < _STRETCH_LIMIT)
+    longest = _edge_stretch(uv, model).max(axis=1)
+    sane = candidates & (density / typical > 1 / _SHRINK_LIMIT)
+    sane &= longest < _STRETCH_LIMIT * np.median(longest[on_lips])
     edges = unique_edges(model.triangles[sane])
     size = (model.n_vertices,) * 2
     graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=size)
     part = csgraph.connected_components(graph, directed=False)[1]
     with_lips = np.unique(part[model.triangles[sane & on_lips].reshape(-1)])
     return sane & np.isin(part[model.triangles[:, 0]], with_lips)
+
+
+def _edge_stretch(uv: np.ndarray, model: FaceModel) -> np.ndarray:
+    """Length in the chart over length on the neutral of each triangle's edges, (T, 3)."""
+    around = [1, 2, 0]
+    chart = uv[model.triangles[:, around]] - uv[model.triangles]
+    space = model.neutral_mm[model.triangles[:, around]] - model.neutral_mm[model.triangles]
+    return np.linalg.norm(chart, axis=2) / np.maximum(np.linalg.norm(space, axis=2), 1e-6)
 
 
 def _texels_per_uv(model: FaceModel, in_domain: np.ndarray, texel_mm: float) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Paint:
         rim_px: how far that blur reaches into the mouth opening.
         samples: rays a pixel, a side.
         grain: match the picture's noise.
+        gap_mm: skin closer than this to the painted region is not trusted to be bare.
     """
 
     domain: LipDomain
@@ -51,6 +53,17 @@ class Paint:
     rim_px: float = 2.5
     samples: int = 3
     grain: bool = True
+    gap_mm: float = 1.0
+
+    @cached_property
+    def bare(self) -> np.ndarray:
+        """(h, w) bool, skin that surely has no tattoo."""
+        return bare_skin(self.domain, self.opacity, self.gap_mm)
+
+    @cached_property
+    def unpainted(self) -> np.ndarray:
+        """(h, w) float32, 1 on all skin that is not painted."""
+        return bare_skin(self.domain, self.opacity, 0.0).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -92,7 +105,7 @@ def paint_frame(
         return None
     caster = RayCaster(vertices_mm, triangles)
     frame = bake(domain, vertices_mm, triangles, [(camera, linear)], paint.edge_mm)
-    texture = equalised(domain, paint.plain, paint.reference, frame, paint.opacity, paint.shading)
+    texture = equalised(domain, paint.plain, paint.reference, frame, paint.bare, paint.shading)
     layer = render_layer(domain, texture, paint.opacity, caster, camera, window, paint.samples)
     layer = softened(layer, paint.lens_px)
     pixel_mm = _pixel_mm(camera, vertices_mm[np.unique(triangles[domain.in_domain])])
@@ -100,8 +113,7 @@ def paint_frame(
     layer = opened_by_darkness(layer, linear, _darkest(paint), reach_px)
     result = composite(linear, layer, paint.rim_px)
     # The same rendering on the bare skin, to compare with the picture.
-    bare = bare_skin(domain, paint.opacity, 0.0).astype(np.float32)
-    skin = render_layer(domain, texture, bare, caster, camera, window, paint.samples)
+    skin = render_layer(domain, texture, paint.unpainted, caster, camera, window, paint.samples)
     only_skin = skin.opacity > 0.99
     patch = linear[window.slices]
     rendered = softened(skin, paint.lens_px).rgb

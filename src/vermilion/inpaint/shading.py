@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from vermilion.inpaint.bake import Texture
@@ -28,14 +27,12 @@ class Shading:
         mode: `ratio` (log intensity), `difference` (intensity, as the paper writes) or `none`.
         sigma_mm: low-pass of the change between a frame and the reference.
         border_mm: low-pass of the match to the skin round the painted region.
-        gap_mm: skin closer than this to the painted region is not trusted to be bare.
         limit: largest gain, and its inverse the smallest.
     """
 
     mode: str = "ratio"
     sigma_mm: float = 2.0
     border_mm: float = 2.0
-    gap_mm: float = 1.0
     limit: float = 2.5
 
 
@@ -44,7 +41,7 @@ def equalised(
     plain: Texture,
     reference: Texture,
     frame: Texture,
-    opacity: np.ndarray,
+    bare: np.ndarray,
     shading: Shading,
 ) -> np.ndarray:
     """The plain texture under a frame's light, (h, w, 3) float32 linear, everywhere filled.
@@ -53,10 +50,10 @@ def equalised(
         plain: without the tattoo, from all cameras.
         reference: the tattooed neutral in the painted camera.
         frame: the frame in the same camera.
-        opacity: (h, w) where it will be painted; 0 is bare skin, which calibrates the colours.
+        bare: (h, w) bool, skin that surely has no tattoo; it calibrates the colours.
     """
     base = fill_holes(plain.rgb, plain.seen)
-    bare = bare_skin(domain, opacity, shading.gap_mm) & plain.seen
+    bare = bare & plain.seen
     # 1. The plain take against the reference pose, known on the bare skin round the lips.
     base = base * skin_gain(domain, base, reference, bare, shading)
     # 2. The change from the reference pose to this frame.
@@ -70,8 +67,8 @@ def equalised(
 
 def bare_skin(domain: LipDomain, opacity: np.ndarray, gap_mm: float) -> np.ndarray:
     """Texels of the outer face at least `gap_mm` away from what is painted, (h, w) bool."""
-    away = cv2.distanceTransform((opacity <= 0).astype(np.uint8), cv2.DIST_L2, 5)
-    return (away * domain.texel_mm > gap_mm) & domain.valid & ~domain.inner
+    away = domain.distance_mm(opacity > 0, gap_mm + 1.0)
+    return (away > gap_mm) & domain.valid & ~domain.inner
 
 
 def change_ratio(

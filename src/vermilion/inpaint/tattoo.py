@@ -33,22 +33,21 @@ def tattoo_mask(
     typical, spread = _robust_spread(difference[skin])
     coloured = known & (difference > typical + sensitivity * spread)
     coloured &= domain.lip_distance_mm <= reach_mm
-    coloured = _morph(coloured, cv2.MORPH_CLOSE, closing_mm / domain.texel_mm)
-    coloured = _morph(coloured, cv2.MORPH_OPEN, 0.4 / domain.texel_mm)
+    coloured = _opened(domain, _closed(domain, coloured, closing_mm), 0.4)
     vermilion = domain.valid & (domain.lip_distance_mm < 0.5 * domain.texel_mm)
     mask = _joined_to(coloured | vermilion, vermilion)
     # Inside the mouth only what both neutrals show can be judged; the rest continues its border.
     hidden = domain.valid & ~known
     continued = fill_holes(mask.astype(np.float32), known | vermilion) > 0.5
     mask = np.where(hidden, continued, mask) & domain.valid
-    return _morph(mask, cv2.MORPH_CLOSE, closing_mm / domain.texel_mm) & domain.valid
+    return _closed(domain, mask, closing_mm)
 
 
 def feathered(
     domain: LipDomain, mask: np.ndarray, border_mm: float, feather_mm: float
 ) -> np.ndarray:
     """Opacity (h, w) float32: 1 up to `border_mm` outside the mask, then smoothly to 0."""
-    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5) * domain.texel_mm
+    outside = domain.distance_mm(mask, border_mm + feather_mm + 1.0)
     t = np.clip((outside - border_mm) / max(feather_mm, 1e-6), 0.0, 1.0)
     return np.where(domain.valid, 1.0 - t * t * (3.0 - 2.0 * t), 0.0).astype(np.float32)
 
@@ -74,13 +73,16 @@ def _robust_spread(values: np.ndarray) -> tuple[float, float]:
     return typical, max(1.4826 * float(np.median(np.abs(values - typical))), 0.004)
 
 
-def _morph(mask: np.ndarray, operation: int, radius: float) -> np.ndarray:
-    size = 2 * max(1, round(radius)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    margin = size  # so that closing does not open the picture's border
-    padded = np.pad(mask.astype(np.uint8), margin)
-    done = cv2.morphologyEx(padded, operation, kernel)
-    return done[margin:-margin, margin:-margin].astype(bool)
+def _closed(domain: LipDomain, mask: np.ndarray, radius_mm: float) -> np.ndarray:
+    """Gaps narrower than twice the radius filled."""
+    grown = domain.distance_mm(mask, radius_mm) <= radius_mm
+    return domain.valid & (domain.distance_mm(~grown, radius_mm + 1.0) > radius_mm)
+
+
+def _opened(domain: LipDomain, mask: np.ndarray, radius_mm: float) -> np.ndarray:
+    """Parts narrower than twice the radius removed."""
+    shrunk = domain.distance_mm(~mask, radius_mm + 1.0) > radius_mm
+    return mask & (domain.distance_mm(shrunk & mask, radius_mm) <= radius_mm)
 
 
 def _joined_to(mask: np.ndarray, seeds: np.ndarray) -> np.ndarray:
