@@ -15,6 +15,7 @@ from vermilion.config.load import load_configuration
 from vermilion.config.takes import STUDIO, Take
 from vermilion.errors import ConfigurationError
 from vermilion.workflow import checksums
+from vermilion.workflow.cache import roles_of, wildcards_of
 from vermilion.workflow.fingerprint import fingerprint
 
 IS_MAIN_PROCESS = workflow.exec_mode == ExecMode.DEFAULT
@@ -57,11 +58,6 @@ def plain_value(key):
 def code_of(script):
     """Fingerprint of `workflow/scripts/<script>.py` and of all that it imports from the library."""
     return lambda wildcards: fingerprint(SCRIPTS / f"{script}.py")
-
-
-def wildcards_of(wildcards):
-    """The wildcards of a job, for the parameters of a cached rule: its key does not hold them."""
-    return dict(wildcards)
 
 
 def takes(role=None, subject=None):
@@ -165,4 +161,7 @@ def record_checksums():
         Path(R), sorted(outputs), lambda path: getattr(outputs[path], "endtime", None)
     )
     for damage in refused:
-        print(f"not to be trusted: {damage.path} ({damage.reason}); run `make verify`", file=sys.stderr)
+        print(
+            f"not to be trusted: {damage.path} ({damage.reason}); run `make verify`",
+            file=sys.stderr,
+        )

@@ -33,18 +33,19 @@ rule face_model:
     input:
         source=face_source,
     output:
-        studio=f"{R}/face/studio.npz",
-        template=f"{R}/face/template.npz",
-        tracker=f"{R}/face/tracker.npz",
+        multiext(
+            f"{R}/face/", studio="studio.npz", template="template.npz", tracker="tracker.npz"
+        ),
     log:
         f"{R}/logs/face_model.log",
-    benchmark:
-        f"{R}/benchmarks/face_model.tsv"
+    cache: True
     resources:
         mem_mb=3000,
         runtime=20,
     params:
         cfg=cfg_of("face_model"),
         code=code_of("face_model"),
+        wc=wildcards_of,
+        roles=roles_of,
     script:
         "../scripts/face_model.py"

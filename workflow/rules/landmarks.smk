@@ -44,16 +44,19 @@ def training_takes():
     return [take for take in TAKES if take.name in wanted]
 
 
+def landmark_label_files(take):
+    """Landmark labels of a take: those on disk, or those that the studio will write."""
+    if take.source == STUDIO:
+        return [path for path in studio_label_files(take) if "/labels/landmarks/" in path]
+    return [str(path) for path in label_files(take.source)]
+
+
 def landmark_model_inputs(wildcards):
-    """Checked frames of the training takes, and the labels of captures that exist."""
+    """Checked frames of the training takes, and their labels."""
     inputs = []
     for take in training_takes():
         pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
-        inputs += expand_chunks(pattern, take.subject, take.take)
-        if take.source == STUDIO:
-            inputs += [path for path in studio_label_files(take) if "/landmarks/" in path]
-        else:
-            inputs += [str(path) for path in label_files(take.source)]
+        inputs += expand_chunks(pattern, take.subject, take.take) + landmark_label_files(take)
     return inputs
 
 
@@ -62,18 +65,18 @@ rule landmark_model:
     input:
         landmark_model_inputs,
     output:
-        model=LANDMARK_MODEL,
-        overlay=R + "/landmarks/overlay.png",
+        multiext(R + "/landmarks/", model="model.npz", overlay="overlay.png"),
     log:
         R + "/logs/landmark_model.log",
-    benchmark:
-        R + "/benchmarks/landmark_model.tsv"
+    cache: True
     resources:
         mem_mb=2500,
         runtime=60,
     params:
         cfg=cfg_of("landmarks.training"),
         code=code_of("landmark_model"),
+        wc=wildcards_of,
+        roles=roles_of,
         takes=lambda wildcards: [
             {"subject": t.subject, "take": t.take, "source": source_of(t)}
             for t in training_takes()
