@@ -68,9 +68,9 @@ def measured_against(take):
 rule quality:
     """Joins the flagged frames of every stage: quality.tsv."""
     input:
-        quality_files(),
+        tables=quality_files(),
     output:
-        report(
+        flagged=report(
             R + "/quality.tsv",
             category="Tables",
             labels={"table": "flagged frames"},
@@ -102,7 +102,7 @@ rule summary:
         overlays=[path for _, _, path in stage_overlays()],
         videos=[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
     output:
-        report(
+        page=report(
             R + "/evaluation/summary.html",
             category="Summary",
             labels={"page": "summary"},

@@ -7,8 +7,8 @@ from vermilion.images import write_srgb8
 from vermilion.logfile import log_to
 from vermilion.tables import read_table
 
-if __name__ == "__main__":
-    log_to(snakemake.log[0])
+
+def main(snakemake):
     cfg = FiguresConfig(**snakemake.params.cfg["evaluation.figures"])
     maps = load_arrays(snakemake.input.maps)
     names = maps["regressors"].tolist()
@@ -24,3 +24,8 @@ if __name__ == "__main__":
     write_srgb8(snakemake.output.maps, picture)
     title = f"{snakemake.wildcards.subject}/{snakemake.wildcards.take}"
     curves(read_table(snakemake.input.frames), title, snakemake.output.curves)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

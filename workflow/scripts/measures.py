@@ -11,8 +11,8 @@ from vermilion.evaluation.table1 import table1
 from vermilion.logfile import log_to
 from vermilion.tables import read_table, write_table
 
-if __name__ == "__main__":
-    log_to(snakemake.log[0])
+
+def main(snakemake):
     options = MeasuresConfig(**snakemake.params.cfg["evaluation.measures"])
     pooled = (options.bootstrap_samples, options.confidence, options.seed)
     tables = [pd.DataFrame(columns=list(COLUMNS))]
@@ -25,3 +25,8 @@ if __name__ == "__main__":
     write_table(snakemake.output.table1, summary)
     bars(summary, snakemake.output.picture)
     print(summary.to_string())
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -4,8 +4,13 @@ from vermilion.logfile import log_to
 from vermilion.quality import flagged_frames
 from vermilion.tables import write_table
 
+
+def main(snakemake):
+    flagged = flagged_frames(snakemake.input.tables)
+    write_table(snakemake.output.flagged, flagged)
+    print(flagged.to_string())
+
+
 if __name__ == "__main__":
     log_to(snakemake.log[0])
-    flagged = flagged_frames(snakemake.input)
-    write_table(snakemake.output[0], flagged)
-    print(flagged.to_string())
+    main(snakemake)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vermilion.evaluation.summary import Findings, Overlay, summary_page
+from vermilion.evaluation.summary import FRAME_COLUMNS, Findings, Overlay, summary_page
 from vermilion.files import atomic_path
 from vermilion.logfile import log_to
 from vermilion.tables import read_table
@@ -38,10 +38,10 @@ def main(snakemake):
         curve_pictures=named("training", inputs.training),
         overlays=[Overlay(*what, path) for what, path in named("overlays", inputs.overlays)],
         videos=named("videos", inputs.videos),
-        frames=pd.DataFrame(snakemake.params.frames),
+        frames=pd.DataFrame(snakemake.params.frames, columns=list(FRAME_COLUMNS)),
         settings=settings(cfg),
     )
-    with atomic_path(snakemake.output[0]) as temporary:
+    with atomic_path(snakemake.output.page) as temporary:
         temporary.write_text(summary_page(found, limit_mb), encoding="utf-8")
 
 

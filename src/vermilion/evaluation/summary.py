@@ -11,6 +11,7 @@ import pandas as pd
 from vermilion.evaluation import page
 from vermilion.evaluation.table1 import in_order
 
+FRAME_COLUMNS = ("take", "role", "frames", "held_out", "against")
 _STAGES = (
     "capture", "multiview", "inpaint", "landmarks", "tracking", "contours", "features",
     "correspondence", "correction", "evaluation", "apply",
