@@ -136,12 +136,21 @@ def opened_by_darkness(layer: Layer, linear: np.ndarray, darkest: float, reach_p
     along = cv2.filter2D(evidence, -1, _kernel_along(opening), borderType=cv2.BORDER_REPLICATE)
     opened = np.clip(2.0 * (along - 0.5) + 0.6, 0.0, 1.0)
     keep = np.clip((1.0 - opened) / np.maximum(1.0 - layer.open, 1e-3), 0.0, 1.0)
+    keep[_islands(layer.opacity * keep > 0.3)] = 0.0
     return replace(
         layer,
         rgb=layer.rgb * keep[..., None],
         opacity=layer.opacity * keep,
         open=np.minimum(layer.open + layer.opacity * (1.0 - keep), 1.0),
     )
+
+
+def _islands(painted: np.ndarray, share: float = 0.03) -> np.ndarray:
+    """Small parts of what is painted, cut off by the gap: they are no lips."""
+    _, part, facts, _ = cv2.connectedComponentsWithStats(painted.astype(np.uint8), connectivity=8)
+    small = facts[:, cv2.CC_STAT_AREA] < share * painted.sum()
+    small[0] = False
+    return small[part]
 
 
 def _kernel_along(opening: np.ndarray, long_px: float = 2.0, short_px: float = 0.4) -> np.ndarray:
@@ -157,31 +166,33 @@ def _kernel_along(opening: np.ndarray, long_px: float = 2.0, short_px: float = 0
     return (kernel / kernel.sum()).astype(np.float32)
 
 
-def composite(linear: np.ndarray, layer: Layer, rim_px: float) -> np.ndarray:
+def composite(linear: np.ndarray, layer: Layer, rim_px: float, darkest: float = 0.0) -> np.ndarray:
     """A copy of a picture (h, w, 3), linear, with the layer painted over it.
 
     Pixels without skin (mouth opening, teeth, background) keep their colour, except within `rim_px`
     of the painted lips, where the lens mixed the tattoo into them: there the colour of the pure
-    pixels behind is continued.
+    pixels behind is continued. Where the opening is too narrow for pure pixels, those count that are
+    darker than the lips ever are (luminance `darkest`).
     """
     result = np.array(linear, dtype=np.float32)
     patch = result[layer.window.slices]
-    behind = _behind(patch, layer, rim_px)
+    behind = _behind(patch, layer, rim_px, darkest)
     opened = np.minimum(layer.open, 1.0 - layer.opacity)[..., None]
     bare = np.clip(1.0 - layer.opacity[..., None] - opened, 0.0, 1.0)
     result[layer.window.slices] = layer.rgb + bare * patch + opened * behind
     return result
 
 
-def _behind(patch: np.ndarray, layer: Layer, rim_px: float) -> np.ndarray:
+def _behind(patch: np.ndarray, layer: Layer, rim_px: float, darkest: float) -> np.ndarray:
     """The colour of what lies behind the lips, (h, w, 3), as if the lips had not blurred into it."""
     painted = layer.opacity > 0.02
     if not painted.any():
         return patch
     distance = cv2.distanceTransform((~painted).astype(np.uint8), cv2.DIST_L2, 5)
     t = np.clip(distance / max(rim_px, 1e-6), 0.0, 1.0)
-    # Where the opening is narrow no pixel is pure; the least mixed ones count most.
-    purity = layer.open * (t**3 + 1e-4)
+    # Where the opening is narrow no pixel is pure; the darkest are the least mixed.
+    mixed_in = luminance(patch) / max(darkest, 1e-3)
+    purity = layer.open * (t**3 + 1e-3 / (1.0 + mixed_in**2) ** 2)
     continued, support = weighted_blur(patch, purity, max(rim_px, 0.5))
     smooth = (t * t * (3.0 - 2.0 * t))[..., None]
     mixed = smooth * patch + (1.0 - smooth) * continued

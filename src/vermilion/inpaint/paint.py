@@ -110,8 +110,9 @@ def paint_frame(
     layer = softened(layer, paint.lens_px)
     pixel_mm = _pixel_mm(camera, vertices_mm[np.unique(triangles[domain.in_domain])])
     reach_px = paint.edge_mm / pixel_mm
-    layer = opened_by_darkness(layer, linear, _darkest(paint), reach_px)
-    result = composite(linear, layer, paint.rim_px)
+    darkest = _darkest(paint)
+    layer = opened_by_darkness(layer, linear, darkest, reach_px)
+    result = composite(linear, layer, paint.rim_px, darkest)
     # The same rendering on the bare skin, to compare with the picture.
     skin = render_layer(domain, texture, paint.unpainted, caster, camera, window, paint.samples)
     only_skin = skin.opacity > 0.99
