@@ -14,7 +14,7 @@ import numpy as np
 from vermilion.contours.pool import FeaturePool, box_feature
 
 N_BINS = 64
-CHECK_EVERY = 16  # trees between two rejections at evaluation
+CHECK_EVERY = 4  # trees between two rejections at evaluation
 
 
 @dataclass(frozen=True)
