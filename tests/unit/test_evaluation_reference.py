@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.unit.evaluation_face import sheet_face
-from vermilion.evaluation.closest import Surface, SurfacePoints
+from vermilion.evaluation.closest import Surface, SurfacePoints, _closest_of
 from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, drift, reference_of, truth_of_vertices
 from vermilion.mesh import vertex_normals
@@ -30,6 +30,15 @@ def test_nearest_point_is_exact_on_a_mesh_with_very_long_triangles():
     sampled = brute_force(points, vertices, model.triangles)
     assert (found.distance_mm <= sampled + 1e-9).all()
     assert (sampled - found.distance_mm).max() < 6.0  # the samples are up to 11 mm apart
+    surface = Surface(vertices, model.triangles)
+    everything = np.tile(np.arange(len(surface.corners)), (len(points), 1))
+    exact, none = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    _closest_of(
+        points, np.zeros_like(points), none, np.arange(len(points)), everything, surface.corners,
+        surface.normals, np.zeros(len(surface.corners), np.int64), -2.0, exact, none.copy(),
+        np.zeros_like(points),
+    )  # fmt: skip
+    assert (found.distance_mm == exact).all()
     on = found.on(vertices, model.triangles)
     assert np.abs(np.linalg.norm(points - on, axis=1) - found.distance_mm).max() < 1e-9
 

@@ -11,7 +11,9 @@ from scipy.spatial import cKDTree
 
 from vermilion.mesh import triangle_areas, triangle_normals
 
-_FIRST_CANDIDATES = 8
+_FIRST_CANDIDATES = 2
+_CONDITIONAL_CANDIDATES = 48
+_SIZE_QUANTILES = (0.25, 0.5, 0.75, 0.9, 0.98)
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,12 @@ class Surface:
         self.normals = triangle_normals(vertices, triangles[kept])
         centroids = self.corners.mean(axis=1)
         radii = np.linalg.norm(self.corners - centroids[:, None], axis=2).max(axis=1)
-        # Few large triangles would force long candidate lists: they are searched for by themselves.
-        bound = np.quantile(radii, 0.98)
+        # Candidates are searched for among triangles of like size: one large triangle in a tree of
+        # small ones would make every candidate list long.
+        order = np.argsort(radii, kind="stable")
+        bounds = np.searchsorted(radii[order], np.quantile(radii, _SIZE_QUANTILES), side="right")
         self._groups = []
-        for members in (np.flatnonzero(radii <= bound), np.flatnonzero(radii > bound)):
+        for members in np.split(order, np.unique(bounds)):
             if len(members):
                 self._groups.append((members, cKDTree(centroids[members]), radii[members].max()))
 
@@ -73,8 +77,8 @@ class Surface:
 
         With `normals` (N, 3), only triangles whose normal makes a cosine of at least `min_cosine`
         count. With `labels` (N,) and `triangle_labels` (T,) of all triangles, only triangles with an
-        equal label count; label 0 goes with every label. Conditions are met among the 96 nearest
-        triangles or not at all.
+        equal label count; label 0 goes with every label. Conditions are met among the 48 nearest
+        triangles of each size or not at all.
         """
         points = np.ascontiguousarray(points_mm, dtype=np.float64)
         conditional = normals is not None or labels is not None
@@ -87,23 +91,34 @@ class Surface:
         best = np.full(len(points), np.inf)
         triangle = np.full(len(points), -1, np.int64)
         barycentric = np.zeros((len(points), 3))
-        first = _FIRST_CANDIDATES
-        for members, tree, radius in self._groups:
-            todo, k = np.arange(len(points)), 96 if conditional else first
-            while len(todo):
-                k = min(k, len(members))
-                far, near = tree.query(points[todo], k=k)
-                near = members[near.reshape(len(todo), k)]
-                far = far.reshape(len(todo), k)[:, -1]
-                _closest_of(
-                    points, given, wanted, todo, near, self.corners, self.normals, owned,
-                    cosine, best, triangle, barycentric,
-                )  # fmt: skip
-                if conditional or k == len(members):
+
+        def search(group: tuple, rows: np.ndarray, k: int) -> np.ndarray:
+            """Try the k candidates of each row; returns the distance to the farthest centroid."""
+            members, tree, _ = group
+            far, near = tree.query(points[rows], k=k)
+            near = members[near.reshape(len(rows), k)]
+            _closest_of(
+                points, given, wanted, rows, near, self.corners, self.normals, owned,
+                cosine, best, triangle, barycentric,
+            )  # fmt: skip
+            return far.reshape(len(rows), k)[:, -1]
+
+        # First a good bound from few candidates of every size, then what could be nearer still.
+        everything = np.arange(len(points))
+        start = [
+            min(_CONDITIONAL_CANDIDATES if conditional else _FIRST_CANDIDATES, len(group[0]))
+            for group in self._groups
+        ]
+        reached = [search(g, everything, k) for g, k in zip(self._groups, start, strict=True)]
+        for group, k, far in zip(self._groups, start, reached, strict=True):
+            rows = everything
+            while not conditional and k < len(group[0]):
+                open_rows = far < best[rows] + group[2]
+                rows = rows[open_rows]
+                if not len(rows):
                     break
-                todo = todo[far < best[todo] + radius]
-                k *= 3
-            first = 1
+                k = min(3 * k, len(group[0]))
+                far = search(group, rows, k)
         triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
         return SurfacePoints(triangle, barycentric, best)
 

@@ -10,6 +10,7 @@ import numpy as np
 from vermilion.errors import InputError
 from vermilion.evaluation.errors import ClipSums
 from vermilion.files import atomic_path
+from vermilion.sequences import read_sequence
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
@@ -57,6 +58,12 @@ def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
     """Frame numbers of chunk files `<first>-<last>.<suffix>` in their order."""
     spans = [[int(number) for number in Path(path).stem.split("-")] for path in paths]
     return np.concatenate([np.arange(first, last + 1) for first, last in spans])
+
+
+def read_frames(paths: Sequence[str | Path], frames: np.ndarray) -> np.ndarray:
+    """Meshes (F, V, 3) of chunk files `<first>-<last>.npy` at frame numbers (F,)."""
+    row_of = {int(frame): row for row, frame in enumerate(frames_of(paths))}
+    return read_sequence(paths)[[row_of[int(frame)] for frame in frames]]
 
 
 def read_chunks(paths: Sequence[str | Path], frames: np.ndarray, names: Sequence[str]) -> dict:
