@@ -30,7 +30,7 @@ rule database:
             f"{R}/subjects/{subject}/correspondence.npz" for subject in subjects("tattoo")
         ],
     output:
-        R + "/database/lips.h5",
+        database=R + "/database/lips.h5",
     log:
         R + "/logs/database.log",
     benchmark:

@@ -16,7 +16,7 @@ def regressor_outputs():
 rule train:
     """Trains a regressor on one subject (PS), all (MS) or all but one (GR)."""
     input:
-        R + "/database/lips.h5",
+        database=R + "/database/lips.h5",
     output:
         model=R + "/models/{regressor}.h5",
         curve=R + "/models/{regressor}.cv.tsv",

@@ -21,7 +21,7 @@ def main(snakemake):
     first = next(iter(maps.values()))
     names = read_take_files(*files[0]).feature_names
     write_database(
-        snakemake.output[0],
+        snakemake.output.database,
         first.coarse_triangles,
         names,
         [SubjectEntry(name, m.coarse_neutral_mm, m.mask) for name, m in maps.items()],

@@ -12,7 +12,7 @@ from vermilion.tables import write_table
 def main(snakemake):
     name, output = snakemake.wildcards.regressor, snakemake.output
     selection = Selection(**TrainingConfig(**snakemake.params.cfg["training"]).model_dump())
-    with LipDatabase(snakemake.input[0]) as database:
+    with LipDatabase(snakemake.input.database) as database:
         data = database.training_set(training_subjects(name, database.subjects))
         place = (database.feature_names, database.mask, database.area_mm2, database.topology)
     model, curve = train(name, data, *place, selection)
