@@ -21,7 +21,7 @@ from vermilion.inpaint.composite import (
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import luminance, weighted_blur
 from vermilion.inpaint.grain import add_grain, missing_grain
-from vermilion.inpaint.shading import Shading, bare_skin, equalised
+from vermilion.inpaint.shading import Shading, bare_skin, equalised, under_reference
 from vermilion.raycast import RayCaster
 
 
@@ -57,8 +57,13 @@ class Paint:
 
     @cached_property
     def bare(self) -> np.ndarray:
-        """(h, w) bool, skin that surely has no tattoo."""
-        return bare_skin(self.domain, self.opacity, self.gap_mm)
+        """(h, w) bool, skin that surely has no tattoo, seen in the plain take."""
+        return bare_skin(self.domain, self.opacity, self.gap_mm) & self.plain.seen
+
+    @cached_property
+    def base(self) -> np.ndarray:
+        """(h, w, 3) the plain texture under the light of the reference pose."""
+        return under_reference(self.domain, self.plain, self.reference, self.bare, self.shading)
 
     @cached_property
     def unpainted(self) -> np.ndarray:
@@ -105,7 +110,7 @@ def paint_frame(
         return None
     caster = RayCaster(vertices_mm, triangles)
     frame = bake(domain, vertices_mm, triangles, [(camera, linear)], paint.edge_mm)
-    texture = equalised(domain, paint.plain, paint.reference, frame, paint.bare, paint.shading)
+    texture = equalised(domain, paint.base, paint.reference, frame, paint.bare, paint.shading)
     layer = render_layer(domain, texture, paint.opacity, caster, camera, window, paint.samples)
     layer = softened(layer, paint.lens_px)
     pixel_mm = _pixel_mm(camera, vertices_mm[np.unique(triangles[domain.in_domain])])

@@ -36,32 +36,43 @@ class Shading:
     limit: float = 2.5
 
 
+def under_reference(
+    domain: LipDomain, plain: Texture, reference: Texture, bare: np.ndarray, shading: Shading
+) -> np.ndarray:
+    """The plain texture under the light of the reference pose, (h, w, 3), everywhere filled.
+
+    The two takes are compared on the bare skin round the lips.
+
+    Args:
+        plain: without the tattoo, from all cameras.
+        reference: the tattooed neutral in the painted camera.
+        bare: (h, w) bool, skin that surely has no tattoo.
+    """
+    base = fill_holes(plain.rgb, plain.seen)
+    return base * skin_gain(domain, base, reference, bare & plain.seen, shading)
+
+
 def equalised(
     domain: LipDomain,
-    plain: Texture,
+    base: np.ndarray,
     reference: Texture,
     frame: Texture,
     bare: np.ndarray,
     shading: Shading,
 ) -> np.ndarray:
-    """The plain texture under a frame's light, (h, w, 3) float32 linear, everywhere filled.
+    """The plain texture under a frame's light, (h, w, 3) float32 linear.
 
     Args:
-        plain: without the tattoo, from all cameras.
+        base: (h, w, 3) from `under_reference`.
         reference: the tattooed neutral in the painted camera.
         frame: the frame in the same camera.
-        bare: (h, w) bool, skin that surely has no tattoo; it calibrates the colours.
+        bare: (h, w) bool, skin seen without tattoo in all of them.
     """
-    base = fill_holes(plain.rgb, plain.seen)
-    bare = bare & plain.seen
-    # 1. The plain take against the reference pose, known on the bare skin round the lips.
-    base = base * skin_gain(domain, base, reference, bare, shading)
-    # 2. The change from the reference pose to this frame.
     if shading.mode == "ratio":
         base = base * change_ratio(domain, reference, frame, shading)[..., None]
     elif shading.mode == "difference":
         base = np.maximum(base + change_difference(domain, reference, frame, shading), 0.0)
-    # 3. What is left at the border, faded out towards the middle of the lips.
+    # What is left at the border, faded out towards the middle of the lips.
     return base * border_gain(domain, base, frame, bare, shading)[..., None]
 
 
