@@ -39,6 +39,12 @@ rule all:
         apply_outputs(),
 
 
+rule captures:
+    """Only the synthetic captures, with their truth."""
+    input:
+        studio_outputs(),
+
+
 rule database_only:
     """The training database of all subjects (Lips16 section 3)."""
     input:

@@ -29,6 +29,9 @@ rule database:
         correspondence=lambda wildcards: [
             f"{R}/subjects/{subject}/correspondence.npz" for subject in subjects("tattoo")
         ],
+        identity=lambda wildcards: [
+            f"{R}/subjects/{subject}/identity.npz" for subject in subjects("tattoo")
+        ],
     output:
         database=R + "/database/lips.h5",
     log:

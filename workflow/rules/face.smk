@@ -33,9 +33,7 @@ rule face_model:
     input:
         source=face_source,
     output:
-        multiext(
-            f"{R}/face/", studio="studio.npz", template="template.npz", tracker="tracker.npz"
-        ),
+        multiext(f"{R}/face/", studio="studio.npz", template="template.npz", tracker="tracker.npz"),
     log:
         f"{R}/logs/face_model.log",
     cache: True

@@ -8,7 +8,7 @@ def neutral_manifest(wildcards):
 
 
 rule multiview_neutral:
-    """Registers the template to the take's first frame: neutral.npz, cloud_neutral.ply (Lips16 3.1)."""
+    """Registers the template to the take's first frame: neutral.npz and its cloud (Lips16 3.1)."""
     input:
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
@@ -17,6 +17,7 @@ rule multiview_neutral:
     output:
         neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
         cloud=R + "/takes/{subject}/{take}/multiview/cloud_neutral.ply",
+        surface=R + "/takes/{subject}/{take}/multiview/surface_neutral.ply",
         overlay=R + "/takes/{subject}/{take}/multiview/overlay/neutral.png",
     log:
         R + "/logs/multiview_neutral/{subject}-{take}.log",

@@ -104,6 +104,17 @@ def studio_cameras(subject, take):
     return [f"{folder}/{name}.txt" for name in ("cameras", "images", "points3D")]
 
 
+def studio_outputs():
+    """Every picture, camera, label and truth file of the studio's takes."""
+    paths = []
+    for take in [take for take in TAKES if take.source == STUDIO]:
+        for chunk in chunks(take.subject, take.take):
+            paths += studio_frames(take.subject, take.take, chunk)
+        paths += studio_cameras(take.subject, take.take) + studio_label_files(take)
+        paths.append(f"{R}/truth/{take.name}/vertices_mm.npy")
+    return paths
+
+
 def studio_frames(subject, take, chunk):
     """Pictures of a chunk of a studio take."""
     role = _TAKES[f"{subject}/{take}"].role

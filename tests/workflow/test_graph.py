@@ -1,0 +1,86 @@
+"""The graph of jobs: truth stays in the evaluation, and parameters hold what a rule reads."""
+
+import re
+
+import pytest
+
+from .conftest import ROOT, Project
+
+RULES = sorted((ROOT / "workflow" / "rules").glob("*.smk"))
+SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+#: Rules that measure.
+MEASURING = {"evaluate", "evaluate_reconstruction"}
+
+
+def jobs_of(printed: str) -> list[tuple[str, str, str]]:
+    """(rule, inputs, outputs) of every job that a dry run prints."""
+    pattern = r"^(?:local)?rule (\w+):\n((?:    .+\n)+)"
+    jobs = []
+    for rule, body in re.findall(pattern, printed, flags=re.MULTILINE):
+        fields = dict(re.findall(r"^    (\w+): (.*)$", body, flags=re.MULTILINE))
+        jobs.append((rule, fields.get("input", ""), fields.get("output", "")))
+    return jobs
+
+
+@pytest.mark.slow
+def test_only_the_evaluation_reads_truth(fresh_project):
+    run = fresh_project.snakemake("--dry-run")
+    jobs = jobs_of(run.stdout + run.stderr)
+    assert len(jobs) > 50
+    readers = {rule for rule, inputs, _ in jobs if "/truth/" in inputs}
+    writers = {rule for rule, _, outputs in jobs if "/truth/" in outputs}
+    assert readers == MEASURING
+    assert writers and all(rule.startswith("studio_rig_") for rule in writers)
+
+
+@pytest.mark.slow
+def test_only_the_evaluation_reads_external_truth(fresh_project, data_root):
+    if not (ROOT / "../shared/data").resolve().samefile(data_root):
+        pytest.skip("config/sample.yaml names ../shared/data, the data lie elsewhere")
+    link = fresh_project.folder.parent / "shared"
+    if not link.exists():
+        link.mkdir()
+        (link / "data").symlink_to(data_root.resolve())
+    run = Project(fresh_project.folder, "config/sample.yaml").snakemake("--dry-run")
+    jobs = jobs_of(run.stdout + run.stderr)
+    assert {rule for rule, inputs, _ in jobs if "capture-sample-truth" in inputs} == MEASURING
+
+
+def test_no_script_reads_configuration_or_other_paths_by_itself():
+    for path in SCRIPTS:
+        text = path.read_text()
+        assert "snakemake.config" not in text, path.name
+        assert not re.search(r"results/|yaml", text), path.name
+
+
+def rules_in(path):
+    """(name, body) of the rules of a file."""
+    return re.findall(r"^ *rule (\w*):\n((?:(?: +.*)?\n)+)", path.read_text(), flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda p: p.stem)
+def test_every_rule_has_log_resources_and_fingerprint(path):
+    for name, body in rules_in(path):
+        assert "log:" in body, f"{path.name}: {name}"
+        assert "mem_mb" in body and "runtime" in body, f"{path.name}: {name}"
+        assert "code=code_of(" in body, f"{path.name}: {name}"
+        if "cache:" in body:
+            assert "wc=wildcards_of" in body and "roles=roles_of" in body, f"{path.name}: {name}"
+        else:
+            assert "benchmark:" in body, f"{path.name}: {name}"
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
+def test_a_script_is_run_by_one_rule_with_its_own_fingerprint(path):
+    text = "".join(rule.read_text() for rule in RULES)
+    assert text.count(f'"../scripts/{path.name}"') == text.count(f'code_of("{path.stem}")') >= 1
+
+
+@pytest.mark.slow
+def test_wrong_configuration_stops_before_any_job(fresh_project):
+    run = fresh_project.snakemake("--config", "chunk_frames=none", "results=", check=False)
+    printed = run.stdout + run.stderr
+    assert run.returncode != 0
+    assert "2 problem(s) in the configuration" in printed
+    assert "key chunk_frames: found 'none'" in printed and "key results: found ''" in printed
+    assert "Job stats" not in printed
