@@ -79,6 +79,7 @@ def neutral(root):
         output={
             "neutral": root / "neutral.npz",
             "cloud": root / "cloud_neutral.ply",
+            "surface": root / "surface_neutral.ply",
             "overlay": root / "neutral.png",
         },
     )
@@ -125,6 +126,8 @@ def test_the_neutral_lies_on_the_true_surface(take):
     assert np.median(error) < 0.1
     assert np.percentile(error, 95) < 0.5
     assert (take / "cloud_neutral.ply").stat().st_size > 10_000
+    surface = read_mesh(take / "surface_neutral.ply").vertices_mm
+    assert np.abs(surface - vertices.mean(axis=0)).max() < 60
     assert image_size(take / "neutral.png")[0] > 240
 
 

@@ -17,6 +17,7 @@ from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.take import ImageSettings, Pictures
 from vermilion.multiview.triangulate import triangulate_landmarks
+from vermilion.sequences import write_ply
 
 
 def main(snakemake):
@@ -47,6 +48,7 @@ def main(snakemake):
     print(f"seen by a pair: {np.mean(found.information > 0):.0%} of the vertices")
     write_neutral(snakemake.output.neutral, found)
     write_cloud(snakemake.output.cloud, found.cloud)
+    write_ply(snakemake.output.surface, found.surface)
     sheet = neutral_sheet(frame, found, model.triangles, unique_edges(model.triangles))
     write_srgb8(snakemake.output.overlay, sheet)
 

@@ -93,10 +93,10 @@ class NeutralConfig(StageConfig):
     )
     rounds: int = Field(9, ge=2, le=50, description="Rounds of dense registration.")
     poisson_depth: int = Field(
-        8, ge=5, le=12, description="Octree depth of the screened Poisson reconstruction."
+        7, ge=5, le=12, description="Octree depth of the screened Poisson reconstruction."
     )
     polish_lengths_mm: list[float] = Field(
-        [4.0, 3.0, 2.5],
+        [3.0, 1.5],
         description="Stiffness of each round of photo-consistency between cameras (mm).",
     )
     sigma_px: float = Field(

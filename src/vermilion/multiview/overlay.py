@@ -8,11 +8,17 @@ import cv2
 import numpy as np
 
 from vermilion.camera import Camera
-from vermilion.draw import colour_map, draw_mesh, draw_points, label, tile
+from vermilion.draw import colour_map, draw_mesh, draw_points, tile
+from vermilion.draw import label as write_label
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.take import RefinedFrame
 from vermilion.multiview.views import Frame, View
+
+
+def label(picture: np.ndarray, text: str) -> np.ndarray:
+    """A picture at the sheet's size with a line of text."""
+    return write_label(_reduced(picture), text)
 
 
 def show(view: View) -> np.ndarray:
@@ -133,3 +139,12 @@ def frames_sheet(
                 ),
             ]
     return tile(pictures, 5)
+
+
+def _reduced(picture: np.ndarray, height_px: int = 360) -> np.ndarray:
+    """At most `height_px` high."""
+    height, width = picture.shape[:2]
+    if height <= height_px:
+        return picture
+    size = (round(width * height_px / height), height_px)
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vermilion.mesh import vertex_normals
-from vermilion.multiview.photometric import FlowMatcher, measure_motion, sight
+from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.views import Frame, pixel_jacobian
 from vermilion.raycast import RayCaster
@@ -37,12 +37,15 @@ def normal_offsets(
     sights = {
         name: sight(caster, view.camera, vertices_mm, normals) for name, view in frame.views.items()
     }
+    rasters = {
+        name: rasterise(caster, view.camera, sights[name]) for name, view in frame.views.items()
+    }
     offsets, weights = [], []
     for a, b in pairs:
         for source, target in ((a, b), (b, a)):
             motion = measure_motion(
                 matcher,
-                caster,
+                rasters[target],
                 sights[target],
                 frame.views[target],
                 frame.views[source],

@@ -14,7 +14,7 @@ import numpy as np
 
 from vermilion.mesh import vertex_normals
 from vermilion.multiview.motion import Measurements, Reference, cloud_planes, solve_motion
-from vermilion.multiview.photometric import FlowMatcher, measure_motion, sight
+from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.views import Frame, pixel_jacobian
 from vermilion.raycast import RayCaster
@@ -114,12 +114,11 @@ def measure_frame(
         motions.append(
             measure_motion(
                 matcher,
-                caster,
+                rasterise(caster, view.camera, seen, stride_px),
                 seen,
                 view,
                 reference.frame.views[name],
                 reference.sights[name],
-                stride_px=stride_px,
                 min_agreement=min_agreement,
             )
         )
