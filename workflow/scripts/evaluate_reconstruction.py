@@ -50,7 +50,9 @@ def main(snakemake):
     )  # fmt: skip
     regions = regions_of_mask(template, sequence[0], mouth)
     slid = drift(sequence, triangles, reference, regions.used & reference.valid, cosine)
-    sums = evaluate_reconstruction(sequence, frames, regions, reference, slid, options.clip_frames, options.min_clips)
+    sums = evaluate_reconstruction(
+        sequence, frames, regions, reference, slid, options.clip_frames, options.min_clips
+    )
     save_sums(snakemake.output.sums, sums, len(frames))
     table = measure_rows(
         sums, wildcards.subject, wildcards.take, len(frames),
