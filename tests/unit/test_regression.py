@@ -15,6 +15,7 @@ from vermilion.regression.cross_validation import (
 from vermilion.regression.estimators import (
     AffineRegressor,
     RBFNetwork,
+    bias_of_a_stranger,
     gaussian_activations,
     temporal_prototypes,
 )
@@ -182,6 +183,51 @@ def test_cross_validation_equals_fitting_and_predicting(data):
                 plain = error(RBFNetwork(alpha, beta, feature_groups=groups))
                 assert curve.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
             assert affine.errors[0, j, k] == pytest.approx(error(AffineRegressor(alpha)), rel=1e-5)
+
+
+def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(data):
+    features, targets = data
+    persons = np.repeat([0, 1, 2], [50, 60, 10])
+    targets = targets + 5.0 * persons[:, None]
+    clips = clips_of(persons, 10, 4)
+    curve = cross_validate_affine(
+        features, target_gram(targets), 30, clips, alphas=[0.1], n_folds=4, persons=persons
+    )
+    for k, (train, held) in enumerate(GroupKFold(4).split(clips, groups=clips)):
+        people, label = np.unique(persons[train], return_inverse=True)
+        regressor = AffineRegressor(0.1).fit(features[train], targets[train], persons=label)
+        squares = []
+        for person in np.unique(persons[held]):
+            rows = held[persons[held] == person]
+            if person in people:
+                predicted = regressor.predict(features[rows], int(np.searchsorted(people, person)))
+                squares.append((predicted - targets[rows]) ** 2)
+        if set(persons[held]) <= set(people):
+            plain = np.sqrt(np.concatenate(squares).mean())
+            assert curve.errors[0, 0, k] == pytest.approx(plain, rel=1e-5)
+
+
+def test_a_bias_a_person_takes_what_no_feature_tells(data):
+    features, targets = data
+    persons = np.repeat([0, 1], 60)
+    shifted = targets + np.where(persons == 0, -2.0, 3.0)[:, None]
+    plain = AffineRegressor(1.0).fit(features, targets, persons=persons)
+    own = AffineRegressor(1.0).fit(features, shifted, persons=persons)
+    np.testing.assert_allclose(own.weights_, plain.weights_, atol=1e-9)
+    for person, shift in ((0, -2.0), (1, 3.0)):
+        np.testing.assert_allclose(
+            own.predict(features, person), plain.predict(features, person) + shift, atol=1e-9
+        )
+
+
+def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
+    neutral = np.zeros(400)
+    rng = np.random.default_rng(0)
+    alike = 1.0 + 0.01 * rng.normal(size=(4, 400))
+    np.testing.assert_allclose(bias_of_a_stranger(alike, neutral), 1.0, atol=0.03)
+    unlike = rng.normal(size=(4, 400))
+    assert np.abs(bias_of_a_stranger(unlike, neutral)).mean() < 0.1
+    np.testing.assert_allclose(bias_of_a_stranger(alike[:1], neutral), alike[0] / 2)
 
 
 def test_choice_takes_the_smoothest_within_one_standard_error(data):

@@ -7,12 +7,18 @@ from vermilion.database.schema import SubjectEntry
 from vermilion.database.write import write_database
 from vermilion.logfile import log_to
 from vermilion.progress import progress
+from vermilion.tracking.result import Identity
 
 
 def main(snakemake):
     inputs, params = snakemake.input, snakemake.params
     cfg = DatabaseConfig(**params.cfg["database"])
     maps = dict(zip(params.subjects, map(Correspondence.load, inputs.correspondence), strict=True))
+    people = map(Identity.load, inputs.identity)
+    entries = [
+        SubjectEntry(name, person.neutral_mm, found.mask)
+        for (name, found), person in zip(maps.items(), people, strict=True)
+    ]
     layers, features = iter(inputs.layers), iter(inputs.features)
     files = [
         (take, *([next(paths) for _ in range(take["chunks"])] for paths in (layers, features)))
@@ -24,7 +30,7 @@ def main(snakemake):
         snakemake.output.database,
         first.coarse_triangles,
         names,
-        [SubjectEntry(name, m.coarse_neutral_mm, m.mask) for name, m in maps.items()],
+        entries,
         (read_take_files(*each).entry for each in progress(files, "takes")),
         **cfg.model_dump(),
     )

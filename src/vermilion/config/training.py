@@ -59,3 +59,9 @@ class TrainingConfig(StageConfig):
         "one with the fewest effective degrees of freedom within one standard error of it, which "
         "goes further beyond the training where there are few clips.",
     )
+    bias: Literal["person", "shared"] = Field(
+        "person",
+        description="`person`: each person of the training has a bias of their own, which takes the "
+        "identity in the layers, and is used again where the same person is corrected. `shared`: one "
+        "bias, as in the paper.",
+    )

@@ -5,8 +5,8 @@
 
 `model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
 **C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
-`neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`), which only sets the
-weights of the integration; `features` (F, M) are those of the take. For known layers (the oracle):
+`neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`): it sets the weights
+of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are those of the take. For known layers (the oracle):
 
     corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
                                     translation_mm, valid=valid, seam_mm=8.0)
@@ -37,7 +37,7 @@ class Corrector:
         seam_mm: float = 8.0,
     ):
         model.check_topology(triangles)
-        self.model = model
+        self.model, self.neutral_mm = model, np.asarray(neutral_mm, dtype=np.float64)
         self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm)
 
     def correct(self, coarse_mm: np.ndarray, features: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ class Corrector:
         corrected = np.array(coarse_mm, dtype=np.float64)
         for first in range(0, len(corrected), BLOCK):
             part = slice(first, first + BLOCK)
-            layers = self.model.predict_frames_last(features[part])
+            layers = self.model.predict_frames_last(features[part], self.neutral_mm)
             corrected[part, self.integrator.free] += self.integrator.displacements(
                 corrected[part], layers
             )

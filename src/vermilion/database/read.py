@@ -115,4 +115,5 @@ class LipDatabase:
                 frames[to] = group["frames"][part]
             first += len(part)
         names = tuple(f"{s}/{t}" for s, t in chosen)
-        return TrainingSet(features, layers, sequences, names, frames)
+        neutrals = {s: self.neutral_mm(s) for s in sorted({s for s, _ in chosen})}
+        return TrainingSet(features, layers, sequences, names, frames, neutrals)

@@ -16,7 +16,8 @@ class SubjectEntry:
 
     Attributes:
         subject: name.
-        neutral_mm: (V, 3) coarse neutral in the head frame.
+        neutral_mm: (V, 3) coarse neutral of the person in the head frame (`identity.npz`), by which
+            a regressor knows them again.
         mask: (M,) ascending ids of the coarse triangles whose layers were made.
     """
 
@@ -70,6 +71,7 @@ class TrainingSet:
         sequences: (F,) int index into `takes`.
         takes: names `subject/take`.
         frames: (F,) int32 frame numbers.
+        neutrals_mm: subject -> (V, 3) coarse neutral.
     """
 
     features: np.ndarray
@@ -77,3 +79,17 @@ class TrainingSet:
     sequences: np.ndarray
     takes: tuple[str, ...]
     frames: np.ndarray
+    neutrals_mm: dict[str, np.ndarray]
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """People who have a row, sorted."""
+        present = {self.takes[k].split("/")[0] for k in np.unique(self.sequences)}
+        return tuple(sorted(present))
+
+    @property
+    def persons(self) -> np.ndarray:
+        """(F,) int index into `subjects`."""
+        of_take = [self.takes[k].split("/")[0] for k in range(len(self.takes))]
+        index = [self.subjects.index(s) if s in self.subjects else -1 for s in of_take]
+        return np.asarray(index, dtype=np.int64)[self.sequences]

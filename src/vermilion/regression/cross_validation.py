@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
+from vermilion.regression.ridge import person_averages
 from vermilion.regression.scaling import feature_scale
 
 Rule = Literal["simplest", "least"]
@@ -113,6 +114,7 @@ def cross_validate_rbf(
     prototype_stride: int = 10,
     prototype_minimum: int = 20,
     feature_groups: Sequence[str] | None = None,
+    persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `RBFNetwork` on a grid.
 
@@ -124,7 +126,9 @@ def cross_validate_rbf(
         n_outputs: the sum of the output weights (their number where unweighted).
         sequences: (F,) labels of the sequences.
         clips: (F,) labels of the clips, which are held out whole.
+        persons: (F,) in 0 .. G - 1 for a bias each, or None.
     """
+    persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
 
     def design_of(beta: float) -> DesignOfFold:
         def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,7 +141,9 @@ def cross_validate_rbf(
 
         return design
 
-    errors = [_fold_errors(design_of(b), gram, clips, alphas, n_folds, n_outputs) for b in betas]
+    errors = [
+        _fold_errors(design_of(b), gram, clips, persons, alphas, n_folds, n_outputs) for b in betas
+    ]
     return Curve(
         np.asarray(alphas, float),
         np.asarray(betas, float),
@@ -156,15 +162,17 @@ def cross_validate_affine(
     alphas: Sequence[float],
     n_folds: int = 5,
     feature_groups: Sequence[str] | None = None,
+    persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `AffineRegressor` for every alpha; arguments as `cross_validate_rbf`."""
+    persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
 
     def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mean, scale = feature_scale(features[train], feature_groups)
         scaled = (features - mean) / scale
         return scaled[train], scaled[held]
 
-    errors, frames = _fold_errors(design, gram, clips, alphas, n_folds, n_outputs)
+    errors, frames = _fold_errors(design, gram, clips, persons, alphas, n_folds, n_outputs)
     freedom = _degrees_of_freedom(design, len(features), alphas)[None]
     return Curve(np.asarray(alphas, float), np.array([np.nan]), errors[None], frames, freedom)
 
@@ -184,6 +192,7 @@ def _fold_errors(
     design_of: DesignOfFold,
     gram: np.ndarray,
     clips: np.ndarray,
+    persons: np.ndarray,
     alphas: Sequence[float],
     n_folds: int,
     n_outputs: float,
@@ -195,7 +204,7 @@ def _fold_errors(
     folds = GroupKFold(n_folds).split(clips, groups=clips)
     errors, frames = [], []
     for train, held in folds:
-        squared = _held_out_squared(*design_of(train, held), gram, train, held, alphas)
+        squared = _held_out_squared(*design_of(train, held), gram, train, held, persons, alphas)
         errors.append(np.sqrt(np.maximum(squared, 0.0) / (len(held) * n_outputs)))
         frames.append(len(held))
     return np.stack(errors, axis=1), np.array(frames)
@@ -207,26 +216,35 @@ def _held_out_squared(
     gram: np.ndarray,
     train: np.ndarray,
     held: np.ndarray,
+    persons: np.ndarray,
     alphas: Sequence[float],
 ) -> np.ndarray:
     """Squared error over the held-out rows for every alpha, (A,).
 
-    With B = Phi V the centred activations in their eigenbasis, D = 1 / (lambda + alpha), and K the
-    Gram matrix about the training mean, the error is
+    With B = Phi V the activations, centred on each person's training mean, in their eigenbasis,
+    D = 1 / (lambda + alpha), and K the Gram matrix about the same means, the error is
     tr K_hh - 2 tr(B_h D B_t' K_th) + tr(B_h D B_t' K_tt B_t D B_h').
     """
-    mean = design_train.mean(axis=0)
-    eigenvalues, basis = linalg.eigh(
-        (design_train - mean).T @ (design_train - mean), overwrite_a=True
-    )
+    # A person of whom nothing is left to train on is judged by everybody's mean.
+    left = np.unique(persons[train])
+    known = np.isin(persons, left)
+    label = np.where(known, np.searchsorted(left, persons), len(left))
+    averages = person_averages(label[train])
+    averages = sparse.vstack([averages, np.full((1, len(train)), 1.0 / len(train))], format="csr")
+
+    means = averages @ design_train
+    centred = design_train - means[label[train]]
+    eigenvalues, basis = linalg.eigh(centred.T @ centred, overwrite_a=True)
     eigenvalues = np.maximum(eigenvalues, 0.0)
-    rotated_train = (design_train - mean) @ basis
-    rotated_held = (design_held - mean) @ basis
-    to_train = gram[:, train].mean(axis=1)
-    offset = to_train[train].mean()
-    held_diagonal = gram[held, held] - 2 * to_train[held] + offset
-    # B_t sums to zero over the rows, so that centring K on the side of B_t changes nothing.
-    cross = rotated_train.T @ (gram[np.ix_(train, held)] - to_train[train][:, None])
+    rotated_train = centred @ basis
+    rotated_held = (design_held - means[label[held]]) @ basis
+
+    to_means = (averages @ gram[train]).T  # (F, people)
+    among_means = averages @ to_means[train]
+    mine = label[held]
+    held_diagonal = gram[held, held] - 2 * to_means[held, mine] + among_means[mine, mine]
+    # B_t sums to zero over each person, so that centring K on the side of B_t changes nothing.
+    cross = rotated_train.T @ (gram[np.ix_(train, held)] - to_means[train][:, mine])
     linear = (cross * rotated_held.T).sum(axis=1)
     quadratic = (rotated_train.T @ gram[np.ix_(train, train)] @ rotated_train) * (
         rotated_held.T @ rotated_held

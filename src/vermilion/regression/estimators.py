@@ -31,15 +31,19 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
         """Design matrix (F, P) of features (F, M)."""
         return self._design(self.scaled(features))
 
-    def predict(self, features: np.ndarray) -> np.ndarray:
-        """Outputs (F, K), in the precision of the weights."""
+    def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
+        """Outputs (F, K), in the precision of the weights; `person` as labelled in `fit`."""
         design = self.activations(features).astype(self.weights_.dtype)
-        return design @ self.weights_ + self.bias_
+        return design @ self.weights_ + self.bias_of(person)
 
-    def predict_frames_last(self, features: np.ndarray) -> np.ndarray:
+    def predict_frames_last(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
         """Outputs (K, F): the order in which the integration reads them."""
         design = self.activations(features).astype(self.weights_.dtype)
-        return self.weights_.T @ design.T + self.bias_[:, None]
+        return self.weights_.T @ design.T + self.bias_of(person)[:, None]
+
+    def bias_of(self, person: int | None) -> np.ndarray:
+        """(K,) of a person of the training, or of anybody else (None)."""
+        return self.bias_ if person is None else self.person_biases_[person]
 
     def _fit_scale(self, features: np.ndarray, targets: np.ndarray) -> np.ndarray:
         features = np.asarray(features, dtype=np.float64)
@@ -52,10 +56,17 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
         self.feature_mean_, self.feature_scale_ = feature_scale(features, self.feature_groups)
         return (features - self.feature_mean_) / self.feature_scale_
 
-    def _fit_outputs(self, design: np.ndarray, targets: np.ndarray) -> None:
-        weights, bias = ridge_weights(design, targets, self.alpha)
+    def _fit_outputs(
+        self, design: np.ndarray, targets: np.ndarray, persons: np.ndarray | None
+    ) -> None:
+        weights, biases = ridge_weights(design, targets, self.alpha, persons=persons)
         self.weights_ = weights
-        self.bias_ = bias.astype(weights.dtype)
+        self.person_biases_ = biases.astype(weights.dtype)
+        self.bias_ = self.person_biases_[0]
+        if persons is not None:
+            first = np.unique(persons, return_index=True)[1]
+            neutral = design[first].mean(axis=0) @ weights
+            self.bias_ = bias_of_a_stranger(biases, neutral).astype(weights.dtype)
 
 
 class RBFNetwork(_LinearOutputs):
@@ -68,8 +79,8 @@ class RBFNetwork(_LinearOutputs):
         prototype_minimum: at least so many prototypes where there are as many frames.
         feature_groups: labels of the features that share a scale, or None.
 
-    Attributes (fitted): `prototypes_` (N, M) scaled, `weights_` (N, K), `bias_` (K,),
-    `feature_mean_`, `feature_scale_` (M,).
+    Attributes (fitted): `prototypes_` (N, M) scaled, `weights_` (N, K), `person_biases_` (G, K),
+    `bias_` (K,) of anybody else, `feature_mean_`, `feature_scale_` (M,).
     """
 
     def __init__(
@@ -92,12 +103,15 @@ class RBFNetwork(_LinearOutputs):
         targets: np.ndarray,
         sequences: np.ndarray | None = None,
         prototypes: np.ndarray | None = None,
+        persons: np.ndarray | None = None,
     ) -> RBFNetwork:
         """Fit on features (F, M) and targets (F, K).
 
         Args:
             sequences: (F,) labels of the sequences, frames in order of time; one if None.
             prototypes: (N,) rows to use as prototypes in place of the temporal sampling.
+            persons: (F,) in 0 .. G - 1, each person starting at their neutral: a bias for each. None:
+                the paper's single bias.
         """
         scaled = self._fit_scale(features, targets)
         if prototypes is None:
@@ -107,7 +121,7 @@ class RBFNetwork(_LinearOutputs):
                 self.prototype_minimum,
             )
         self.prototypes_ = scaled[prototypes]
-        self._fit_outputs(self._design(scaled), targets)
+        self._fit_outputs(self._design(scaled), targets, persons)
         return self
 
     def _design(self, scaled: np.ndarray) -> np.ndarray:
@@ -127,14 +141,38 @@ class AffineRegressor(_LinearOutputs):
         self.feature_groups = feature_groups
 
     def fit(
-        self, features: np.ndarray, targets: np.ndarray, sequences: np.ndarray | None = None
+        self,
+        features: np.ndarray,
+        targets: np.ndarray,
+        sequences: np.ndarray | None = None,
+        persons: np.ndarray | None = None,
     ) -> AffineRegressor:
-        """Fit on features (F, M) and targets (F, K); `sequences` plays no part."""
-        self._fit_outputs(self._design(self._fit_scale(features, targets)), targets)
+        """Fit on features (F, M) and targets (F, K); `sequences` plays no part, `persons` as above."""
+        self._fit_outputs(self._design(self._fit_scale(features, targets)), targets, persons)
         return self
 
     def _design(self, scaled: np.ndarray) -> np.ndarray:
         return scaled
+
+
+def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """Bias (K,) for a person whom the training has not seen.
+
+    The layer at the neutral is identity. A stranger's is expected to be the mean of those seen,
+    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people, and one
+    half where there is but one.
+
+    Args:
+        biases: (G, K) of the people seen.
+        neutral: (K,) weighted activations at the neutral, so that bias + neutral is its layer.
+    """
+    identity = biases + neutral
+    mean, n_persons = identity.mean(axis=0), len(biases)
+    worth = 0.5
+    if n_persons > 1:
+        spread = identity.var(axis=0, ddof=1).mean() / n_persons
+        worth = float(np.clip(1.0 - spread / max(float((mean**2).mean()), 1e-300), 0.0, 1.0))
+    return worth * mean - neutral
 
 
 def gaussian_activations(scaled: np.ndarray, prototypes: np.ndarray, beta: float) -> np.ndarray:

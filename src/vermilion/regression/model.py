@@ -17,10 +17,19 @@ from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 
 FORMAT = "vermilion-regressor"
 FORMAT_VERSION = 1
+#: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
+SAME_PERSON_MM = 0.05
 ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor}
 _ARRAYS = {
-    "rbf": ("prototypes_", "weights_", "bias_", "feature_mean_", "feature_scale_"),
-    "affine": ("weights_", "bias_", "feature_mean_", "feature_scale_"),
+    "rbf": (
+        "prototypes_",
+        "weights_",
+        "bias_",
+        "person_biases_",
+        "feature_mean_",
+        "feature_scale_",
+    ),
+    "affine": ("weights_", "bias_", "person_biases_", "feature_mean_", "feature_scale_"),
 }
 _SETTINGS = {
     "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum"),
@@ -40,6 +49,8 @@ class LipModel:
         mask: (T,) int32 triangle ids of the coarse mesh.
         topology: hash of the coarse topology.
         training_frames: `subject/take` -> (n,) frame numbers trained on.
+        neutrals_mm: subject -> (V, 3) coarse neutral of each person with a bias of their own, in the
+            order of the biases; empty for one shared bias.
         units: what the features and layers are measured in.
     """
 
@@ -50,6 +61,7 @@ class LipModel:
     mask: np.ndarray
     topology: str
     training_frames: dict[str, np.ndarray]
+    neutrals_mm: dict[str, np.ndarray] = field(default_factory=dict)
     units: dict[str, str] = field(
         default_factory=lambda: {"layers": "rad, 1", "features": "see feature_names"}
     )
@@ -58,13 +70,34 @@ class LipModel:
     def training_subjects(self) -> tuple[str, ...]:
         return tuple(sorted({name.split("/")[0] for name in self.training_frames}))
 
-    def predict(self, features: np.ndarray) -> np.ndarray:
-        """Layers (F, T, 9) of features (F, M)."""
-        return self.estimator.predict(self._chosen(features)).reshape(len(features), -1, 9)
+    def person_of(self, neutral_mm: np.ndarray | None) -> int | None:
+        """Which person of the training has this coarse neutral (V, 3); None for nobody."""
+        if neutral_mm is None:
+            return None
+        for index, known in enumerate(self.neutrals_mm.values()):
+            if known.shape == neutral_mm.shape:
+                distance = np.linalg.norm(known - neutral_mm, axis=1)
+                if np.sqrt((distance**2).mean()) < SAME_PERSON_MM:
+                    return index
+        return None
 
-    def predict_frames_last(self, features: np.ndarray) -> np.ndarray:
+    def predict(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
+        """Layers (F, T, 9) of features (F, M).
+
+        Args:
+            neutral_mm: (V, 3) coarse neutral of the person (`identity.npz`), so that the identity of
+                a person of the training is used again; None for somebody else.
+        """
+        person = self.person_of(neutral_mm)
+        flat = self.estimator.predict(self._chosen(features), person)
+        return flat.reshape(len(features), -1, 9)
+
+    def predict_frames_last(
+        self, features: np.ndarray, neutral_mm: np.ndarray | None = None
+    ) -> np.ndarray:
         """Layers (T, 9, F): the order that the integration reads fastest."""
-        flat = self.estimator.predict_frames_last(self._chosen(features))
+        person = self.person_of(neutral_mm)
+        flat = self.estimator.predict_frames_last(self._chosen(features), person)
         return flat.reshape(len(self.mask), 9, len(features))
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
@@ -119,6 +152,9 @@ def save_model(path: str | Path, model: LipModel) -> None:
         _put(file, "features/names", np.array(model.feature_names, dtype="S"))
         _put(file, "features/columns", np.asarray(model.feature_columns, dtype=np.int32))
         _put(file, "mask/triangles", np.asarray(model.mask, dtype=np.int32))
+        for index, (name, neutral) in enumerate(model.neutrals_mm.items()):
+            _put(file, f"persons/{name}", np.asarray(neutral, dtype=np.float64))
+            file[f"persons/{name}"].attrs["index"] = index
         for name, frames in sorted(model.training_frames.items()):
             _put(file, f"training/{name}", np.asarray(frames, dtype=np.int32))
 
@@ -172,6 +208,8 @@ def _read(file: h5py.File) -> LipModel:
     training: dict[str, np.ndarray] = {}
     for subject, takes in file["training"].items():
         training.update({f"{subject}/{take}": frames[:] for take, frames in takes.items()})
+    persons = file["persons"].items() if "persons" in file else ()
+    persons = sorted(persons, key=lambda item: int(item[1].attrs["index"]))
     units = {k.removeprefix("unit_"): str(v) for k, v in file.attrs.items() if k[:5] == "unit_"}
     return LipModel(
         name=str(file.attrs["name"]),
@@ -181,6 +219,7 @@ def _read(file: h5py.File) -> LipModel:
         mask=file["mask/triangles"][:],
         topology=str(file.attrs["topology_sha256"]),
         training_frames=training,
+        neutrals_mm={name: neutral[:] for name, neutral in persons},
         units=units,
     )
 

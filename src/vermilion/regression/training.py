@@ -44,6 +44,7 @@ class Selection:
     folds: int = 5
     clip_frames: int = 30
     choice: Rule = "simplest"
+    bias: Literal["person", "shared"] = "person"
 
 
 def split_name(regressor: str) -> tuple[str, str | None, str]:
@@ -112,13 +113,15 @@ def train(
     weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
     gram = target_gram(data.layers, weights)
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
-    common = {"n_folds": selection.folds, "feature_groups": groups}
+    persons = data.persons if selection.bias == "person" else None
+    common = {"n_folds": selection.folds, "feature_groups": groups, "persons": persons}
     if estimator_kind == "affine":
         curve = cross_validate_affine(
             features, gram, weights.sum(), clips, alphas=sorted(selection.affine_alphas), **common
         )
         _, chosen = curve.choose(selection.choice)
-        estimator = AffineRegressor(float(curve.alphas[chosen]), groups).fit(features, data.layers)
+        estimator = AffineRegressor(float(curve.alphas[chosen]), groups)
+        estimator.fit(features, data.layers, persons=persons)
     else:
         prototypes = {
             "prototype_stride": selection.prototype_stride,
@@ -138,7 +141,7 @@ def train(
         row, column = curve.choose(selection.choice)
         alpha, beta = float(curve.alphas[column]), float(curve.betas[row])
         estimator = RBFNetwork(alpha, beta, **prototypes, feature_groups=groups)
-        estimator.fit(features, data.layers, data.sequences)
+        estimator.fit(features, data.layers, data.sequences, persons=persons)
     used = {
         take: data.frames[data.sequences == k]
         for k, take in enumerate(data.takes)
@@ -152,6 +155,7 @@ def train(
         mask=mask,
         topology=topology,
         training_frames=used,
+        neutrals_mm=data.neutrals_mm if persons is not None else {},
     )
     return model, curve
 
