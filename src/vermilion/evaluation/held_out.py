@@ -112,7 +112,7 @@ def sums_of_regressor(
     known = np.isfinite(take.features).all(axis=1) & true.valid
     predicted = np.full((len(clips), len(common), 9), np.nan)
     if known.any():
-        predicted[known] = regressed.model.predict(take.features[known])[:, ours]
+        predicted[known] = regressed.model.predict(take.features[known], take.neutral_mm)[:, ours]
     areas = triangle_areas(take.neutral_mm, take.triangles[common])
     return sums + sums_of_layers(predicted, true.layers[:, theirs], areas, clips)
 
