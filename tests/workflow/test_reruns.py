@@ -1,0 +1,128 @@
+"""Which rules run again after each kind of change: exactly these, and no others."""
+
+import contextlib
+import os
+import time
+
+import pytest
+
+from vermilion.images import read_image, write_image
+
+pytestmark = pytest.mark.slow
+
+TAKE = "s1/rom"
+#: What follows from new regressors.
+AFTER_TRAINING = {
+    "evaluate", "evaluation_figures", "measures", "apply", "apply_export", "quality", "summary",
+}  # fmt: skip
+AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
+AFTER_CONTOURS = AFTER_FEATURES | {"features"}
+AFTER_TRACKING = AFTER_CONTOURS | {
+    "tracking_meshes", "correspondence", "layers", "evaluate_reconstruction",
+}  # fmt: skip
+AFTER_INPAINT = AFTER_TRACKING | {
+    "landmarks", "identity", "tracking", "contour_detector", "contours",
+}  # fmt: skip
+AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
+AFTER_CAMERAS = AFTER_MULTIVIEW | {
+    "landmarks_views", "multiview_neutral", "multiview_track", "multiview_refine",
+}  # fmt: skip
+
+
+@contextlib.contextmanager
+def changed(path, content: bytes):
+    """Give a file another content, then its own content and time back."""
+    before, state = path.read_bytes(), path.stat()
+    time.sleep(0.01)
+    path.write_bytes(content)
+    try:
+        yield
+    finally:
+        path.write_bytes(before)
+        os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+
+
+@contextlib.contextmanager
+def configured(project, change):
+    """Change the configuration, then give it back."""
+    path = project.folder / project.configuration
+    before = path.read_bytes()
+    project.edit_configuration(change)
+    try:
+        yield
+    finally:
+        path.write_bytes(before)
+
+
+def test_finished_run_has_nothing_to_do(finished):
+    assert finished.would_run() == {}
+
+
+def test_ridge_parameter(finished):
+    def change(content):
+        content.setdefault("training", {})["alphas"] = [0.25]
+
+    with configured(finished, change):
+        assert set(finished.would_run()) == AFTER_TRAINING | {"train"}
+
+
+def test_feather_width(finished):
+    def change(content):
+        content.setdefault("inpaint", {})["composite"] = {"feather_mm": 1.234}
+
+    with configured(finished, change):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_INPAINT | {"inpaint"}
+
+
+def test_contour_label(finished):
+    labels = sorted((finished.folder / "captures" / TAKE / "labels" / "contours").rglob("*.json"))
+    text = labels[0].read_bytes()
+    with changed(labels[0], text + b"\n"):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_CONTOURS | {"contour_detector", "contours"}
+    assert jobs["contour_detector"] == 1  # of this take only
+
+
+def test_image_of_one_frame(finished, tmp_path):
+    path = finished.folder / "captures" / TAKE / "frames" / "face1" / "000010.png"
+    write_image(tmp_path / "darker.png", read_image(path) * 0.9)
+    with changed(path, (tmp_path / "darker.png").read_bytes()):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras"}
+    assert jobs["capture"] == 1  # the chunk that holds it
+    assert jobs["multiview_neutral"] == 1  # of this take only
+
+
+def test_touched_image_with_the_same_content(finished):
+    path = finished.folder / "captures" / TAKE / "frames" / "face1" / "000010.png"
+    with changed(path, path.read_bytes()):
+        assert finished.would_run() == {}
+
+
+def test_chunk_size(finished):
+    everything = AFTER_CAMERAS | {"capture", "cameras", "landmark_model", "plain_texture"}
+    with configured(finished, lambda content: content.update(chunk_frames=6)):
+        assert set(finished.would_run()) <= everything
+        assert {"capture", "multiview_refine", "tracking_meshes"} <= set(finished.would_run())
+
+
+def test_comment_in_a_library_module(finished):
+    path = finished.folder / "src" / "vermilion" / "mesh.py"
+    with changed(path, path.read_bytes() + b"\n# a comment\n"):
+        assert finished.would_run() == {}
+
+
+def test_line_of_code_in_the_tracking_module(finished):
+    path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
+    with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
+        jobs = set(finished.would_run())
+    assert jobs - {"identity"} == AFTER_TRACKING | {"tracking"}
+
+
+def test_camera_file(finished):
+    path = finished.folder / "captures" / TAKE / "cameras" / "images.txt"
+    with changed(path, path.read_bytes() + b"# checked\n"):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras"}
+    assert jobs["cameras"] == 1  # of this take only
