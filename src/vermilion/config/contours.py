@@ -49,7 +49,7 @@ class ContourDetectorConfig(StageConfig):
         description="Width of the band round the landmarks' mouth that is looked at (per "
         "inter-ocular distance).",
     )
-    features: int = Field(2000, ge=50, le=50_000, description="Size of the pool (features).")
+    features: int = Field(1000, ge=50, le=50_000, description="Size of the pool (features).")
     patch_px: int = Field(
         48, ge=8, le=78, description="Side of the patch a feature may reach (region pixels)."
     )

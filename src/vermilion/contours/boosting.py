@@ -15,6 +15,7 @@ from vermilion.contours.pool import FeaturePool, box_feature
 
 N_BINS = 64
 CHECK_EVERY = 4  # trees between two rejections at evaluation
+REJECTED = np.float32(2.5)  # taken off the log-odds of a rejected pixel, for the trees left out
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Forest:
     reject: np.ndarray
 
     def log_odds(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Log-odds of being contour at n pixels, (n,) float32; rejected pixels keep theirs."""
+        """Log-odds of being contour at n pixels, (n,) float32."""
         return _log_odds(
             integrals,
             columns,
@@ -270,5 +271,7 @@ def _log_odds(
                 if score[alive[a]] >= reject[t]:
                     alive[kept] = alive[a]
                     kept += 1
+                else:
+                    score[alive[a]] -= REJECTED
             n_alive = kept
     return score

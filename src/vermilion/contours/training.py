@@ -56,7 +56,7 @@ class TrainingSettings:
 
     interocular_size_px: float = 200.0
     margin: float = 0.16
-    n_features: int = 2000
+    n_features: int = 1000
     patch_px: int = 48
     label_px: float = 1.2
     variants: int = 4
