@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def _load(path: str | Path, needed: Sequence[str], place: Mapping) -> dict[str, 
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
         missing = [name for name in needed if name not in arrays]
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
         arrays, missing = {}, [str(error)]
     if missing:
         raise InputError(

@@ -56,8 +56,8 @@ def split_name(regressor: str) -> tuple[str, str | None, str]:
     for name in VARIANTS:
         if name and regressor.endswith(f"-{name}"):
             base, variant = regressor.removesuffix(f"-{name}"), name
-    kind, _, subject = base.partition("-")
-    if (kind == "MS" and not subject) or (kind in ("PS", "GR") and subject):
+    kind, dash, subject = base.partition("-")
+    if (kind == "MS" and not dash) or (kind in ("PS", "GR") and subject):
         return kind, subject or None, variant
     raise InputError(
         f"a regressor named {regressor!r}",
