@@ -97,7 +97,7 @@ def test_right_side_agrees_with_a_plain_loop(scene):
     fast = integrator.right_side(coarse[:1], np.transpose(layers, (1, 2, 0)))[..., 0]
     slow = np.zeros_like(neutral)
     change = decode_layers(layers[0]) - np.eye(3)
-    for t, (corners, weights) in enumerate(zip(triangles[mask], integrator._weights, strict=True)):
+    for t, (corners, weights) in enumerate(zip(triangles[mask], integrator.weights, strict=True)):
         for k in range(3):
             i, j = corners[(k + 1) % 3], corners[(k + 2) % 3]
             flow = weights[k] * change[t] @ (coarse[0, j] - coarse[0, i])

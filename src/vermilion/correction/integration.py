@@ -30,6 +30,8 @@ class LayerIntegrator:
     Attributes:
         mask: (M,) triangle ids of the layer.
         free: (N,) ids of the vertices that may move.
+        matrix: (N, N) of the system; `factor`: its Cholesky factor.
+        weights: (M, 3) of the edges 12, 20, 01 of each mask triangle.
     """
 
     def __init__(
@@ -52,15 +54,15 @@ class LayerIntegrator:
             len(neutral_mm),
         )
         hold = sparse.diags_array(domain.hold * stiffness.diagonal()[self.free])
-        self._matrix = sparse.csc_matrix(stiffness[self.free][:, self.free] + hold)
-        self.factor = CholeskyFactor(self._matrix)
+        self.matrix = sparse.csc_matrix(stiffness[self.free][:, self.free] + hold)
+        self.factor = CholeskyFactor(self.matrix)
         # The kernel sees only the corners of mask triangles; fixed ones go to a waste row.
         self._local = np.unique(inside)
         position = np.full(len(neutral_mm), len(self.free))
         position[self.free] = np.arange(len(self.free))
         self._row = position[self._local].astype(np.int32)
         self._corners = np.searchsorted(self._local, inside).astype(np.int32)
-        self._weights = weights
+        self.weights = weights
 
     def integrate(self, coarse: np.ndarray, layers: np.ndarray, block: int = 32) -> np.ndarray:
         """Corrected vertices, (F, V, 3) float64.
@@ -92,7 +94,7 @@ class LayerIntegrator:
         """Divergence of the wanted edge changes, (N, 3, F)."""
         corners = np.ascontiguousarray(np.transpose(coarse[:, self._local], (1, 2, 0)))
         right = np.zeros((len(self.free) + 1, 3, corners.shape[2]))
-        _accumulate(self._corners, self._row, self._weights, corners, layers_frames_last, right)
+        _accumulate(self._corners, self._row, self.weights, corners, layers_frames_last, right)
         return right[:-1]
 
 

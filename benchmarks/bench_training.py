@@ -1,0 +1,77 @@
+"""Speed of training at the paper's size, against scikit-learn's grid search.
+
+    OMP_NUM_THREADS=1 python -m benchmarks.bench_training [--peer]
+
+3,289 frames of four people, 53 features, 27,000 outputs (3,000 triangles), 25 grid points, 5 folds
+grouped by clip. Prints seconds and the largest memory. Bars: 60 s and 2 GB. With `--peer`, the time
+of one of the 125 fits of `GridSearchCV` over `KernelRidge` on the same data, and what 126 would take.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+
+import numpy as np
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.model_selection import GroupKFold
+
+from vermilion.database.schema import TrainingSet
+from vermilion.regression.cross_validation import clips_of
+from vermilion.regression.training import Selection, train
+
+N_FRAMES, N_FEATURES, N_TRIANGLES = 3289, 53, 3000
+
+
+def paper_sized_data() -> TrainingSet:
+    """Smooth features of four people and layers that depend on them, of rank 40 plus noise."""
+    rng = np.random.default_rng(0)
+    takes = np.repeat(np.arange(4), 823)[:N_FRAMES]
+    features = rng.normal(size=(N_FRAMES, N_FEATURES)).cumsum(axis=0)
+    features /= features.std(axis=0)
+    hidden = np.sin(features @ rng.normal(size=(N_FEATURES, 40)) / 4).astype(np.float32)
+    layers = hidden @ rng.normal(scale=0.02, size=(40, 9 * N_TRIANGLES)).astype(np.float32)
+    for part in np.array_split(layers, 16):
+        part += 0.01 * rng.standard_normal(part.shape, dtype=np.float32)
+    names = tuple(f"s{k}/rom" for k in range(4))
+    neutrals = {f"s{k}": rng.normal(size=(4, 3)) for k in range(4)}
+    return TrainingSet(
+        features.astype(np.float32), layers, takes, names, np.arange(N_FRAMES), neutrals
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--peer", action="store_true", help="time scikit-learn as well")
+    arguments = parser.parse_args()
+    data = paper_sized_data()
+    names = [f"shape_{k}" for k in range(33)] + [f"outer_{k}" for k in range(20)]
+    selection = Selection(
+        alphas=(1e-3, 1e-2, 1e-1, 1.0, 10.0), betas=(0.03, 0.1, 0.3, 1.0, 3.0), folds=5
+    )
+    start = time.perf_counter()
+    model, curve = train(
+        "MS", data, names, np.arange(N_TRIANGLES), np.ones(N_TRIANGLES), "", selection
+    )
+    seconds = time.perf_counter() - start
+    memory_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(f"{curve.mean.size} grid points, {len(curve.frames)} folds, ", end="")
+    print(f"{len(model.estimator.prototypes_)} prototypes")
+    print(f"training          {seconds:8.1f} s (bar 60)")
+    print(f"largest memory    {memory_gb:8.2f} GB with the data (bar 2)")
+    if arguments.peer:
+        clips = clips_of(data.sequences, selection.clip_frames, 5)
+        rows, held = next(GroupKFold(5).split(clips, groups=clips))
+        start = time.perf_counter()
+        peer = KernelRidge(alpha=0.1, kernel="rbf", gamma=0.002)
+        peer.fit(data.features[rows], data.layers[rows]).score(
+            data.features[held], data.layers[held]
+        )
+        one = time.perf_counter() - start
+        print(f"KernelRidge       {one:8.1f} s a fit and score, {126 * one:.0f} s in GridSearchCV")
+        print(f"faster by         {126 * one / seconds:8.1f} (bar 20)")
+
+
+if __name__ == "__main__":
+    main()
