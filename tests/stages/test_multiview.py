@@ -192,3 +192,20 @@ def test_an_unreadable_frame_is_flagged_and_the_rest_go_on(take):
     assert table["valid"].tolist() == [0, 1]
     assert "0 readable pictures" in table["reason"][0]
     assert np.isfinite(read_sequence(take / "H/000001-000002.npy")).all()
+
+
+def test_a_chunk_without_a_readable_frame_still_ends(take):
+    (take / "empty").mkdir()
+    for camera in lip_patch.cameras():
+        (take / f"empty/frames/{camera}").mkdir(parents=True)
+        whole = take / f"rom/frames/{camera}/000000.png"
+        (take / f"empty/frames/{camera}/000000.png").write_bytes(whole.read_bytes())
+    refine(take, [3], "000003-000003", source="empty")
+    table = read_table(take / "quality/000003-000003.tsv")
+    assert table["valid"].tolist() == [0]
+    assert (take / "overlay/000003-000003.png").is_file()
+
+
+def test_the_neutral_frame_is_the_neutral(take):
+    neutral = np.load(take / "neutral.npz")["vertices_mm"].astype(np.float32)
+    assert np.array_equal(read_sequence(take / "H/000000-000003.npy")[0], neutral)

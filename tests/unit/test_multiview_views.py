@@ -10,7 +10,13 @@ from vermilion.errors import InputError
 from vermilion.multiview.contact import Lips, resolve_contact
 from vermilion.multiview.track import choose_anchors
 from vermilion.multiview.triangulate import triangulate_landmarks
-from vermilion.multiview.views import load_frame, pixel_jacobian, sample, undistorted
+from vermilion.multiview.views import (
+    load_frame,
+    normalise,
+    pixel_jacobian,
+    sample,
+    undistorted,
+)
 
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -146,3 +152,11 @@ def test_lips_that_pass_through_each_other_are_parted_and_counted():
     moved = np.abs(found.vertices_mm - vertices)[:, 2]
     assert moved[:441].max() > 3 * moved[441:].max()  # what cameras see moves less
     assert moved.max() < 0.6
+
+
+def test_exposure_changes_nothing_where_there_is_texture():
+    rng = np.random.default_rng(0)
+    grey = (0.4 + 0.15 * rng.normal(size=(80, 90))).clip(0, 1).astype(np.float32)
+    a, b = normalise(grey, 6.0, 0.005), normalise(0.6 * grey + 0.1, 6.0, 0.005)
+    assert np.abs(a.astype(int) - b).mean() < 1.5  # grey levels of 255
+    assert a.std() > 25

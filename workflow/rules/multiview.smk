@@ -24,7 +24,7 @@ rule multiview_neutral:
     benchmark:
         R + "/benchmarks/multiview_neutral/{subject}-{take}.tsv"
     resources:
-        mem_mb=3000,
+        mem_mb=1500,
         runtime=30,
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.neutral"),
@@ -50,7 +50,7 @@ rule multiview_track:
     benchmark:
         R + "/benchmarks/multiview_track/{subject}-{take}.tsv"
     resources:
-        mem_mb=3000,
+        mem_mb=1500,
         runtime=240,
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
@@ -80,7 +80,7 @@ rule multiview_refine:
     benchmark:
         R + "/benchmarks/multiview_refine/{subject}-{take}-{chunk}.tsv"
     resources:
-        mem_mb=3000,
+        mem_mb=1500,
         runtime=60,
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.refine"),

@@ -37,16 +37,17 @@ def main(snakemake):
         pictures, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
     )
     drawn = {frames[i] for i in np.linspace(0, len(frames) - 1, 3).astype(int)}
-    refined, shown = [], []
+    meshes, seeing, rows, shown = [], [], [], []
     for number, start in progress(zip(frames, coarse, strict=True), "multiview", len(frames)):
         found = refiner.refine(number, start)
-        refined.append(found)
+        meshes.append(found.registered.vertices_mm.astype(np.float32))
+        seeing.append(found.registered.cameras_seeing)
+        rows.append(found.quality)
         if number in drawn and found.quality.valid:
             shown.append((pictures.load(number), found))
-    write_sequence(snakemake.output.meshes, np.array([f.registered.vertices_mm for f in refined]))
+    write_sequence(snakemake.output.meshes, np.array(meshes))
     with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
-        np.save(stream, np.array([f.registered.cameras_seeing for f in refined]))
-    rows = [f.quality for f in refined]
+        np.save(stream, np.array(seeing))
     write_quality(snakemake.output.quality, subject, take, "multiview", rows)
     write_srgb8(
         snakemake.output.overlay,

@@ -138,6 +138,8 @@ def frames_sheet(
                     "cameras, 0 to 10; grey: unseen",
                 ),
             ]
+    if not pictures:  # no frame of the chunk could be registered
+        pictures = [label(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
     return tile(pictures, 5)
 
 

@@ -132,11 +132,19 @@ class Refiner:
         return np.sum([sight.visible for sight in sights], axis=0) >= 2
 
     def refine(self, number: int, start_mm: np.ndarray) -> RefinedFrame:
-        """Register a frame from its coarse position (V, 3); a failure is flagged, not raised."""
+        """Register a frame from its coarse position (V, 3); a failure is flagged, not raised.
+
+        The neutral's frame is the neutral.
+        """
         try:
             frame = self.pictures.load(number)
         except InputError as error:
             return self._failed(number, start_mm, str(error))
+        finest = self.references[self.settings.scales[-1]]
+        if number == finest.frame.number:
+            return self._neutral(frame, finest)
+        if not set(frame.views) & set(finest.sights):
+            return self._failed(number, start_mm, "no camera in common with the neutral's frame")
         cloud = self._cloud(frame, start_mm)
         levels = [
             (self.references[scale], self.pictures.at(frame, scale), length)
@@ -160,6 +168,15 @@ class Refiner:
         contact = resolve_contact(registered.vertices_mm, self.model.triangles, self.lips, mobility)
         registered = replace(registered, vertices_mm=contact.vertices_mm)
         quality = self._quality(number, frame, registered, contact, cloud)
+        return RefinedFrame(registered, contact, cloud, quality)
+
+    def _neutral(self, frame: Frame, reference: Reference) -> RefinedFrame:
+        seeing = np.sum([sight.visible for sight in reference.sights.values()], axis=0)
+        residual = np.where(seeing > 0, 0.0, np.nan)
+        registered = Registered(self.neutral_mm, seeing.astype(np.uint8), residual)
+        cloud = self._cloud(frame, self.neutral_mm)
+        contact = Contact(self.neutral_mm, 0, 0.0, 0.0)
+        quality = self._quality(frame.number, frame, registered, contact, cloud)
         return RefinedFrame(registered, contact, cloud, quality)
 
     def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:

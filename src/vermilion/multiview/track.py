@@ -200,6 +200,8 @@ def follow(
         weights.append(np.where(seen.visible, weight * np.clip(seen.cosine, 0, 1), 0.0))
         offsets.append(at[:, :2].astype(np.float64))
         jacobians.append(pixel_jacobian(view.camera, vertices_mm))
+    if not jacobians:  # no camera has both frames
+        return vertices_mm
     measured = Measurements(np.array(jacobians), np.array(offsets), np.array(weights))
     solution = solve_motion(
         reference.plate,
