@@ -62,7 +62,7 @@ def test_header_is_named(tmp_path):
 
 @pytest.mark.parametrize(
     ("split", "train", "test"),
-    [("train", 10, 0), ("test", 0, 10), ("none", 0, 0), ("test:2-4", 7, 3)],
+    [("train", 10, 0), ("test", 0, 10), ("none", 0, 0), ("test:2-4", 7, 3), ("test:2-4,8-9", 5, 5)],
 )
 def test_no_frame_is_both_trained_and_tested(split, train, test):
     take = Take("s", "t", "tattoo", "x", 0, 9, 30.0, split)

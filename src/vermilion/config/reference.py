@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from vermilion.config.root import Configuration
-from vermilion.config.takes import COLUMNS
+from vermilion.config.takes import COLUMNS, SPLIT
 from vermilion.files import atomic_path
 
 ROLES = ("tattoo", "plain", "video", "tracked")
@@ -44,8 +44,8 @@ def take_sheet_schema() -> dict[str, Any]:
         "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Frames a second."},
         "split": {
             "type": "string",
-            "pattern": r"^(train|test|none|test:\d+-\d+)$",
-            "description": "train, test, none, or test:A-B (frames A to B are held out).",
+            "pattern": f"^({SPLIT})$",
+            "description": "train, test, none, or test:A-B,C-D (these stretches are held out).",
         },
     }
     return {

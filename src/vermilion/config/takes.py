@@ -10,6 +10,8 @@ from typing import Literal, get_args
 
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
+#: What a split may be.
+SPLIT = r"train|test|none|test:\d+-\d+(,\d+-\d+)*"
 #: `source` of a take that the studio makes.
 STUDIO = "studio"
 
@@ -24,7 +26,8 @@ class Take:
         source: capture folder, frame folder or video file; `studio` for the embedded default.
         first, last: frame numbers, both included. The first is the neutral.
         fps: frames a second.
-        split: `train`, `test`, `test:A-B` (frames A to B are held out, the rest trains), or `none`.
+        split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
+            rest trains).
     """
 
     subject: str
@@ -51,8 +54,7 @@ class Take:
     def held_out(self, frame: int) -> bool:
         """Whether no regressor may train on this frame."""
         if self.split.startswith("test:"):
-            low, high = (int(n) for n in self.split[5:].split("-"))
-            return low <= frame <= high
+            return any(low <= frame <= high for low, high in stretches(self.split))
         return self.split != "train"
 
     def test_frames(self) -> list[int]:
@@ -61,6 +63,14 @@ class Take:
 
     def train_frames(self) -> list[int]:
         return [f for f in self.frames if not self.held_out(f)]
+
+
+def stretches(split: str) -> list[tuple[int, int]]:
+    """First and last frame of each held-out stretch of a split `test:A-B,C-D`."""
+    return [
+        (int(low), int(high))
+        for low, high in (part.split("-") for part in split.removeprefix("test:").split(","))
+    ]
 
 
 def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
@@ -122,18 +132,18 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
     if numbers.get("fps", 1) <= 0:
         wrong.append(f"fps: found {numbers['fps']}; expected more than 0 frames a second.")
     split = value["split"] or "none"
-    if not re.fullmatch(r"train|test|none|test:\d+-\d+", split):
+    if not re.fullmatch(SPLIT, split):
         wrong.append(
-            f"split: found '{split}'; expected train, test, none or test:A-B "
-            "(frames A to B held out)."
+            f"split: found '{split}'; expected train, test, none or test:A-B,C-D "
+            "(frames A to B and C to D held out)."
         )
     elif split.startswith("test:") and {"first", "last"} <= numbers.keys():
-        low, high = (int(n) for n in split[5:].split("-"))
-        if not numbers["first"] <= low <= high <= numbers["last"]:
-            wrong.append(
-                f"split: found held-out frames {low} to {high}; expected them within "
-                f"{numbers['first']} to {numbers['last']}."
-            )
+        for low, high in stretches(split):
+            if not numbers["first"] <= low <= high <= numbers["last"]:
+                wrong.append(
+                    f"split: found held-out frames {low} to {high}; expected them within "
+                    f"{numbers['first']} to {numbers['last']}."
+                )
     if wrong:
         return None, wrong
     return Take(
