@@ -128,6 +128,18 @@ def test_a_group_keeps_its_proportions_and_weighs_as_much_as_any_other(data):
     assert variance[:3].sum() == pytest.approx(variance[3:].sum())
 
 
+@pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor])
+def test_features_beyond_the_reach_count_as_its_border(data, kind):
+    features, targets = data
+    low, high = features.min(axis=0), features.max(axis=0)
+    border = kind(reach=0.5).fit(features, targets)
+    edge = high + 0.5 * (high - low)
+    np.testing.assert_allclose(border.predict(edge[None] + 50), border.predict(edge[None]))
+    free = kind().fit(features, targets)
+    np.testing.assert_allclose(free.predict(features), border.predict(features))
+    assert not np.allclose(free.predict(edge[None] + 5), free.predict(edge[None]))
+
+
 def test_a_constant_feature_says_nothing(data):
     features, targets = data
     features = np.column_stack([features, np.full(120, 5.0)])
@@ -166,7 +178,7 @@ def test_cross_validation_equals_fitting_and_predicting(data):
     groups = ["a"] * 3 + ["b"] * 4
     curve = cross_validate_rbf(
         features, target_gram(targets, weights), weights.sum(), sequences, clips,
-        alphas=alphas, betas=betas, feature_groups=groups,
+        alphas=alphas, betas=betas, feature_groups=groups, reach=0.1,
     )  # fmt: skip
     affine = cross_validate_affine(
         features, target_gram(targets, weights), weights.sum(), clips, alphas=alphas
@@ -180,7 +192,8 @@ def test_cross_validation_equals_fitting_and_predicting(data):
 
         for j, alpha in enumerate(alphas):
             for i, beta in enumerate(betas):
-                plain = error(RBFNetwork(alpha, beta, feature_groups=groups))
+                network = RBFNetwork(alpha, beta, feature_groups=groups, reach=0.1)
+                plain = error(network)
                 assert curve.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
             assert affine.errors[0, j, k] == pytest.approx(error(AffineRegressor(alpha)), rel=1e-5)
 

@@ -30,7 +30,7 @@ class IntegrationConfig(StageConfig):
     """From layers to vertices: deformation transfer (Sumner and Popovic 2004)."""
 
     seam_mm: float = Field(
-        8.0,
+        16.0,
         ge=0.0,
         le=50.0,
         description="Width of the ring outside the mask that may give way, so that the border shows "

@@ -30,12 +30,12 @@ class TrainingConfig(StageConfig):
         "keep their own proportions. `feature`: every feature has the same variance.",
     )
     alphas: list[Positive] = Field(
-        [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0],
+        [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0],
         min_length=1,
         description="Ridge parameters of the RBF network that cross-validation tries.",
     )
     betas: list[Positive] = Field(
-        [0.03, 0.1, 0.3, 1.0, 3.0],
+        [0.01, 0.03, 0.1, 0.3, 1.0],
         min_length=1,
         description="Scales of the Gaussians that cross-validation tries, per squared distance of "
         "features scaled to a total variance of 1.",
@@ -52,6 +52,13 @@ class TrainingConfig(StageConfig):
         le=10_000,
         description="Length of the clips that are held out whole (frames); shorter where there are "
         "too few frames for the folds.",
+    )
+    reach: float = Field(
+        0.0,
+        ge=0.0,
+        description="How far beyond the range of the training a feature counts, as a share of that "
+        "range; further out it is held. A large number gives the paper's regressors, which fall back "
+        "to their bias (RBF) or run away (affine) there.",
     )
     choice: Literal["simplest", "least"] = Field(
         "simplest",

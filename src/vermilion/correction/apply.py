@@ -1,7 +1,7 @@
 """Corrected meshes of a take: the interface for evaluation, application and propagation.
 
     corrected = correct_sequence(model, coarse_mm, triangles, neutral_mm, rotation, translation_mm,
-                                 features, valid=valid, seam_mm=8.0)          # (F, V, 3) world, mm
+                                 features, valid=valid, seam_mm=16.0)          # (F, V, 3) world, mm
 
 `model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
 **C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
@@ -9,7 +9,7 @@
 of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are those of the take. For known layers (the oracle):
 
     corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
-                                    translation_mm, valid=valid, seam_mm=8.0)
+                                    translation_mm, valid=valid, seam_mm=16.0)
 
 Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
 correct several stretches of one person, make one `LayerIntegrator` and use `Corrector`.
@@ -34,7 +34,7 @@ class Corrector:
         model: LipModel,
         neutral_mm: np.ndarray,
         triangles: np.ndarray,
-        seam_mm: float = 8.0,
+        seam_mm: float = 16.0,
     ):
         model.check_topology(triangles)
         self.model, self.neutral_mm = model, np.asarray(neutral_mm, dtype=np.float64)
@@ -62,7 +62,7 @@ def correct_sequence(
     features: np.ndarray,
     *,
     valid: np.ndarray | None = None,
-    seam_mm: float = 8.0,
+    seam_mm: float = 16.0,
 ) -> np.ndarray:
     """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
 
@@ -90,7 +90,7 @@ def correct_with_layers(
     translation_mm: np.ndarray,
     *,
     valid: np.ndarray | None = None,
-    seam_mm: float = 8.0,
+    seam_mm: float = 16.0,
 ) -> np.ndarray:
     """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,)."""
     usable = np.isfinite(coarse_mm).all(axis=(1, 2))

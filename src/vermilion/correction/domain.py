@@ -42,7 +42,7 @@ class Domain:
 
 
 def integration_domain(
-    vertices_mm: np.ndarray, triangles: np.ndarray, mask: np.ndarray, seam_mm: float = 8.0
+    vertices_mm: np.ndarray, triangles: np.ndarray, mask: np.ndarray, seam_mm: float = 16.0
 ) -> Domain:
     """Find the free vertices round a mask.
 

@@ -39,7 +39,7 @@ class LayerIntegrator:
         neutral_mm: np.ndarray,
         triangles: np.ndarray,
         mask: np.ndarray,
-        seam_mm: float = 8.0,
+        seam_mm: float = 16.0,
     ):
         neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         domain = integration_domain(neutral_mm, triangles, mask, seam_mm)

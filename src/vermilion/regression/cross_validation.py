@@ -18,7 +18,7 @@ from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
 from vermilion.regression.ridge import person_averages
-from vermilion.regression.scaling import feature_scale
+from vermilion.regression.scaling import feature_range, feature_scale
 
 Rule = Literal["simplest", "least"]
 
@@ -114,6 +114,7 @@ def cross_validate_rbf(
     prototype_stride: int = 10,
     prototype_minimum: int = 20,
     feature_groups: Sequence[str] | None = None,
+    reach: float = np.inf,
     persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `RBFNetwork` on a grid.
@@ -132,8 +133,7 @@ def cross_validate_rbf(
 
     def design_of(beta: float) -> DesignOfFold:
         def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            mean, scale = feature_scale(features[train], feature_groups)
-            scaled = (features - mean) / scale
+            scaled = _scaled(features, train, feature_groups, reach)
             chosen = temporal_prototypes(sequences[train], prototype_stride, prototype_minimum)
             prototypes = scaled[train[chosen]]
             activations = gaussian_activations(scaled, prototypes, beta)
@@ -162,14 +162,14 @@ def cross_validate_affine(
     alphas: Sequence[float],
     n_folds: int = 5,
     feature_groups: Sequence[str] | None = None,
+    reach: float = np.inf,
     persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `AffineRegressor` for every alpha; arguments as `cross_validate_rbf`."""
     persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
 
     def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mean, scale = feature_scale(features[train], feature_groups)
-        scaled = (features - mean) / scale
+        scaled = _scaled(features, train, feature_groups, reach)
         return scaled[train], scaled[held]
 
     errors, frames = _fold_errors(design, gram, clips, persons, alphas, n_folds, n_outputs)
@@ -186,6 +186,15 @@ def _degrees_of_freedom(
     activations = activations - activations.mean(axis=0)
     eigenvalues = np.maximum(linalg.eigvalsh(activations.T @ activations), 0.0)
     return (eigenvalues / (eigenvalues + np.asarray(alphas, float)[:, None])).sum(axis=1)
+
+
+def _scaled(
+    features: np.ndarray, train: np.ndarray, groups: Sequence[str] | None, reach: float
+) -> np.ndarray:
+    """All features in the scale and reach of the rows trained on."""
+    mean, scale = feature_scale(features[train], groups)
+    scaled = (features - mean) / scale
+    return np.clip(scaled, *feature_range(scaled[train], reach))
 
 
 def _fold_errors(

@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from vermilion.regression.ridge import ridge_weights
-from vermilion.regression.scaling import feature_scale
+from vermilion.regression.scaling import feature_range, feature_scale
 
 
 class _LinearOutputs(RegressorMixin, BaseEstimator):
@@ -19,13 +19,14 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
     def _design(self, scaled: np.ndarray) -> np.ndarray:
         raise NotImplementedError
 
-    def scaled(self, features: np.ndarray) -> np.ndarray:
-        """Features (F, M) in the estimator's own scale, float64."""
+    def scaled(self, features: np.ndarray, held: bool = True) -> np.ndarray:
+        """Features (F, M) in the estimator's own scale, float64; `held` within its reach."""
         check_is_fitted(self)
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or features.shape[1] != self.n_features_in_:
             raise ValueError(f"features must be (F, {self.n_features_in_}), got {features.shape}")
-        return (features - self.feature_mean_) / self.feature_scale_
+        scaled = (features - self.feature_mean_) / self.feature_scale_
+        return np.clip(scaled, self.feature_low_, self.feature_high_) if held else scaled
 
     def activations(self, features: np.ndarray) -> np.ndarray:
         """Design matrix (F, P) of features (F, M)."""
@@ -54,7 +55,9 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
             )
         self.n_features_in_ = features.shape[1]
         self.feature_mean_, self.feature_scale_ = feature_scale(features, self.feature_groups)
-        return (features - self.feature_mean_) / self.feature_scale_
+        scaled = (features - self.feature_mean_) / self.feature_scale_
+        self.feature_low_, self.feature_high_ = feature_range(scaled, self.reach)
+        return scaled
 
     def _fit_outputs(
         self, design: np.ndarray, targets: np.ndarray, persons: np.ndarray | None
@@ -78,9 +81,10 @@ class RBFNetwork(_LinearOutputs):
         prototype_stride: every how many frames of a sequence become a prototype.
         prototype_minimum: at least so many prototypes where there are as many frames.
         feature_groups: labels of the features that share a scale, or None.
+        reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
 
     Attributes (fitted): `prototypes_` (N, M) scaled, `weights_` (N, K), `person_biases_` (G, K),
-    `bias_` (K,) of anybody else, `feature_mean_`, `feature_scale_` (M,).
+    `bias_` (K,) of anybody else, `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
     """
 
     def __init__(
@@ -90,12 +94,14 @@ class RBFNetwork(_LinearOutputs):
         prototype_stride: int = 10,
         prototype_minimum: int = 20,
         feature_groups: Sequence[str] | None = None,
+        reach: float = np.inf,
     ):
         self.alpha = alpha
         self.beta = beta
         self.prototype_stride = prototype_stride
         self.prototype_minimum = prototype_minimum
         self.feature_groups = feature_groups
+        self.reach = reach
 
     def fit(
         self,
@@ -134,11 +140,18 @@ class AffineRegressor(_LinearOutputs):
     Args:
         alpha: ridge parameter of the linear part.
         feature_groups: labels of the features that share a scale, or None.
+        reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
     """
 
-    def __init__(self, alpha: float = 2.0, feature_groups: Sequence[str] | None = None):
+    def __init__(
+        self,
+        alpha: float = 2.0,
+        feature_groups: Sequence[str] | None = None,
+        reach: float = np.inf,
+    ):
         self.alpha = alpha
         self.feature_groups = feature_groups
+        self.reach = reach
 
     def fit(
         self,

@@ -20,20 +20,19 @@ FORMAT_VERSION = 1
 #: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
 SAME_PERSON_MM = 0.05
 ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor}
-_ARRAYS = {
-    "rbf": (
-        "prototypes_",
-        "weights_",
-        "bias_",
-        "person_biases_",
-        "feature_mean_",
-        "feature_scale_",
-    ),
-    "affine": ("weights_", "bias_", "person_biases_", "feature_mean_", "feature_scale_"),
-}
+_COMMON = (
+    "weights_",
+    "bias_",
+    "person_biases_",
+    "feature_mean_",
+    "feature_scale_",
+    "feature_low_",
+    "feature_high_",
+)
+_ARRAYS = {"rbf": ("prototypes_", *_COMMON), "affine": _COMMON}
 _SETTINGS = {
-    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum"),
-    "affine": ("alpha",),
+    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum", "reach"),
+    "affine": ("alpha", "reach"),
 }
 
 
@@ -106,7 +105,7 @@ class LipModel:
         The distance to the nearest prototype (to the mean, for an affine regressor) in units where
         two training frames are 1.4 apart in the root mean square.
         """
-        scaled = self.estimator.scaled(self._chosen(features))
+        scaled = self.estimator.scaled(self._chosen(features), held=False)
         known = getattr(self.estimator, "prototypes_", np.zeros((1, scaled.shape[1])))
         return np.sqrt(((scaled[:, None] - known[None]) ** 2).sum(axis=2).min(axis=1))
 

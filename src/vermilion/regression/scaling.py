@@ -35,3 +35,18 @@ def feature_scale(
     n_groups = max(int((~constant).sum()), 1)
     divisor = np.sqrt(np.where(constant, np.inf, total) * n_groups)
     return mean, divisor[group]
+
+
+def feature_range(scaled: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest value (M,) that a scaled feature (F, M) counts with.
+
+    Beyond what the training has seen a network falls back to its bias and a linear map runs away;
+    a feature that is held at the border of the training leaves the nearest layer that is known.
+
+    Args:
+        reach: how far beyond, as a share of the range seen; infinite for no limit.
+    """
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    if np.isinf(reach):
+        return np.full_like(low, -np.inf), np.full_like(high, np.inf)
+    return low - reach * (high - low), high + reach * (high - low)

@@ -38,11 +38,12 @@ class Selection:
     prototype_stride: int = 10
     prototype_minimum: int = 20
     scaling: Literal["group", "feature"] = "group"
-    alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
-    betas: Sequence[float] = (0.03, 0.1, 0.3, 1.0, 3.0)
+    alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+    betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
     affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
     folds: int = 5
     clip_frames: int = 30
+    reach: float = 0.0
     choice: Rule = "simplest"
     bias: Literal["person", "shared"] = "person"
 
@@ -115,12 +116,13 @@ def train(
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
     persons = data.persons if selection.bias == "person" else None
     common = {"n_folds": selection.folds, "feature_groups": groups, "persons": persons}
+    common["reach"] = selection.reach
     if estimator_kind == "affine":
         curve = cross_validate_affine(
             features, gram, weights.sum(), clips, alphas=sorted(selection.affine_alphas), **common
         )
         _, chosen = curve.choose(selection.choice)
-        estimator = AffineRegressor(float(curve.alphas[chosen]), groups)
+        estimator = AffineRegressor(float(curve.alphas[chosen]), groups, selection.reach)
         estimator.fit(features, data.layers, persons=persons)
     else:
         prototypes = {
@@ -140,7 +142,9 @@ def train(
         )
         row, column = curve.choose(selection.choice)
         alpha, beta = float(curve.alphas[column]), float(curve.betas[row])
-        estimator = RBFNetwork(alpha, beta, **prototypes, feature_groups=groups)
+        estimator = RBFNetwork(
+            alpha, beta, **prototypes, feature_groups=groups, reach=selection.reach
+        )
         estimator.fit(features, data.layers, data.sequences, persons=persons)
     used = {
         take: data.frames[data.sequences == k]
