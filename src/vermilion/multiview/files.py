@@ -9,6 +9,7 @@ import numpy as np
 
 from vermilion.errors import InputError
 from vermilion.files import atomic_path
+from vermilion.landmarks.views import LandmarkViews
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.track import Track
 from vermilion.multiview.triangulate import SLIDING
@@ -22,8 +23,8 @@ def read_views(
     Returns:
         (names, points (C, 66, 2) px, confidence (C, 66), zero for the sliding points of the jaw).
     """
-    arrays = _load(path, ("cameras", "points_px", "confidence"))
-    names = [str(name) for name in arrays["cameras"]]
+    views = LandmarkViews.load(path)
+    names = [str(name) for name in views.cameras]
     use = [index for index, name in enumerate(names) if name in wanted]
     if len(use) < 2:
         raise InputError(
@@ -32,9 +33,9 @@ def read_views(
             "Look at the landmark overlay; give landmark labels where the detector fails.",
             path=path,
         )
-    confidence = arrays["confidence"][use].astype(np.float64)
+    confidence = views.confidence[use].astype(np.float64)
     confidence[:, SLIDING] = 0.0
-    return [names[index] for index in use], arrays["points_px"][use].astype(float), confidence
+    return [names[index] for index in use], views.points_px[use].astype(float), confidence
 
 
 def write_neutral(path: str | Path, neutral: Neutral) -> None:
