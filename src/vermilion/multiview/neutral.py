@@ -65,7 +65,6 @@ class Neutral:
         landmarks: what was triangulated.
         cloud: fused points of the face.
         surface: screened Poisson surface of the cloud.
-        cloud_distance_mm: (V,) to the nearest point of the cloud; infinite past the gate.
     """
 
     vertices_mm: np.ndarray
