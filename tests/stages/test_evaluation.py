@@ -114,6 +114,7 @@ def evaluate(root, name, truth):
         input=inputs,
         output={
             "sums": out / "sums.npz",
+            "seconds": out / "seconds.tsv",
             "measures": out / "measures.tsv",
             "frames": out / "frames.tsv",
             "maps": out / "maps.npz",

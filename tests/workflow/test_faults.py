@@ -27,6 +27,7 @@ def digests(project) -> dict[str, str]:
         if path.is_file()
         and path.relative_to(project.results).parts[0] not in (*NO_RESULT, checksums.LEDGER)
         and not path.name.startswith(".snakemake")
+        and path.name != "seconds.tsv"  # measured time is no result
     }
 
 

@@ -91,6 +91,7 @@ rule evaluate:
         features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
     output:
         measures=EVALUATED + "/measures.tsv",
+        seconds=EVALUATED + "/seconds.tsv",
         sums=EVALUATED + "/sums.npz",
         frames=EVALUATED + "/frames.tsv",
         maps=EVALUATED + "/maps.npz",

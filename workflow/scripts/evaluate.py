@@ -116,6 +116,11 @@ def main(snakemake):
     )  # fmt: skip
     print(table.to_string())
     write_table(out.measures, table)
+    # Apart from the measures: seconds differ from run to run, and measures must not.
+    seconds = {name: of_model.seconds for name, of_model in regressed.items()}
+    write_table(
+        out.seconds, [{**place, "regressor": n, "seconds_per_frame": s} for n, s in seconds.items()]
+    )
     write_table(out.frames, result.table)
     mouth = regions.weights["mouth"] > 0
     count = cfg["evaluation.figures.map_frames"]

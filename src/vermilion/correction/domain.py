@@ -57,7 +57,7 @@ def integration_domain(
     in_mask[triangles[mask]] = True
     if in_mask[triangles].all():
         raise ValueError("the mask covers the whole mesh: nothing is left to hold it in place")
-    followers = _followers(triangles, n_vertices, in_mask)
+    followers = _followers(vertices_mm, triangles, in_mask)
     outside = ~(in_mask | followers)
 
     if seam_mm > 0:
@@ -89,23 +89,29 @@ def _on_outer_border(
     return border & in_mask
 
 
-def _followers(triangles: np.ndarray, n_vertices: int, in_mask: np.ndarray) -> np.ndarray:
-    """Vertices whose connected part, the mask taken away, touches the mask and is not the face."""
+def _followers(vertices_mm: np.ndarray, triangles: np.ndarray, in_mask: np.ndarray) -> np.ndarray:
+    """Vertices of the parts that hang on the mask from within, (V,) bool.
+
+    With the mask taken away the mesh falls into parts. The largest is the face. Any other that
+    touched the mask hangs on it if it lies well inside the mask's reach, as the inside of a mouth
+    does; a forehead or a jaw cut off by a wide mask lies outside.
+    """
+    n_vertices = len(vertices_mm)
     edges = unique_edges(triangles)
     outer = edges[~in_mask[edges].any(axis=1)]
     graph = sparse.csr_matrix(
         (np.ones(len(outer)), (outer[:, 0], outer[:, 1])), shape=(n_vertices, n_vertices)
     )
     _, part = csgraph.connected_components(graph, directed=False)
-    part = np.where(in_mask, -1, part)
-    sizes = np.bincount(part[part >= 0])
+    centre = vertices_mm[in_mask].mean(axis=0)
+    distance = np.linalg.norm(vertices_mm - centre, axis=1)
+    mean_distance = np.bincount(part, distance) / np.bincount(part)
+    inside = mean_distance < 0.7 * distance[in_mask].max()
+    inside[np.bincount(part[~in_mask]).argmax()] = False
     crossing = edges[in_mask[edges].sum(axis=1) == 1]
-    touched = np.unique(part[crossing][~in_mask[crossing]])
-    hanging = np.setdiff1d(touched, [int(np.argmax(sizes))])
-    # The largest part is the face; a large part of it cut off by the mask (a mask from ear to ear)
-    # is face as well.
-    hanging = hanging[sizes[hanging] < 0.25 * sizes.max()]
-    return np.isin(part, hanging)
+    touched = np.zeros(len(inside), dtype=bool)
+    touched[part[crossing[~in_mask[crossing]]]] = True
+    return (inside & touched)[part] & ~in_mask
 
 
 def _distance_from(vertices_mm: np.ndarray, triangles: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -104,17 +104,16 @@ def sums_of_contours(
 def sums_of_regressor(
     regressed: Regressed, take: CoarseTake, true: TrueLayers | None, clips: np.ndarray
 ) -> ClipSums:
-    """Sums behind `seconds_per_frame` and, where the true layers are known, `feature_error`."""
-    sums = sums_of_frames("mouth.seconds", np.full(len(clips), regressed.seconds), clips)
+    """Sums behind `feature_error`; none where the true layers are not known."""
     if true is None:
-        return sums
+        return ClipSums()
     common, ours, theirs = np.intersect1d(regressed.model.mask, true.mask, return_indices=True)
     known = np.isfinite(take.features).all(axis=1) & true.valid
     predicted = np.full((len(clips), len(common), 9), np.nan)
     if known.any():
         predicted[known] = regressed.model.predict(take.features[known], take.neutral_mm)[:, ours]
     areas = triangle_areas(take.neutral_mm, take.triangles[common])
-    return sums + sums_of_layers(predicted, true.layers[:, theirs], areas, clips)
+    return sums_of_layers(predicted, true.layers[:, theirs], areas, clips)
 
 
 def error_map_arrays(

@@ -21,7 +21,6 @@ _RATIOS = (
     ("aperture_error_mm", "aperture", "aperture_frames", "mm"),
     ("false_open_rate", "false_open", "touch_frames", "1"),
     ("contour_error_px", "contour", "contour_frames", "px per px of inter-ocular distance"),
-    ("seconds_per_frame", "seconds", "seconds_frames", "s"),
 )
 _QUANTILES = (("surface_error_median_mm", 0.5), ("surface_error_p95_mm", 0.95))
 

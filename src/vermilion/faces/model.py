@@ -11,6 +11,7 @@ A model plays one of three parts; each adapter (`procedural`, `ict`) builds all 
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -120,7 +121,7 @@ class FaceModel:
         try:
             with np.load(path, allow_pickle=False) as data:
                 arrays = {key: data[key] for key in data.files}
-        except (OSError, ValueError, EOFError) as error:
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ModelFileError(
                 f"an unreadable face model ({error})",
                 "a .npz face model written by this version",
