@@ -61,10 +61,10 @@ class TrainingConfig(StageConfig):
         "to their bias (RBF) or run away (affine) there.",
     )
     choice: Literal["simplest", "least"] = Field(
-        "simplest",
-        description="`least`: the grid point of the least cross-validation error. `simplest`: the "
-        "one with the fewest effective degrees of freedom within one standard error of it, which "
-        "goes further beyond the training where there are few clips.",
+        "least",
+        description="`least`: the grid point of the least cross-validation error, as in the paper. "
+        "`simplest`: the one with the fewest effective degrees of freedom within one standard error "
+        "of it.",
     )
     bias: Literal["person", "shared"] = Field(
         "person",

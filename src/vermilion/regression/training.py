@@ -44,7 +44,7 @@ class Selection:
     folds: int = 5
     clip_frames: int = 30
     reach: float = 0.0
-    choice: Rule = "simplest"
+    choice: Rule = "least"
     bias: Literal["person", "shared"] = "person"
 
 
