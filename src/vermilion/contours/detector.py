@@ -5,18 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
-from zipfile import BadZipFile
 
 import cv2
 import numpy as np
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.contours.boosting import Forest
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
 from vermilion.contours.labels import CONTOURS
 from vermilion.contours.pool import FeaturePool
 from vermilion.contours.region import MouthRegion, mouth_region
 from vermilion.errors import ModelFileError
-from vermilion.files import atomic_path
 
 FORMAT_VERSION = 1
 
@@ -119,8 +118,7 @@ class BoostedDetector:
 
 def save_arrays(path: str | Path, arrays: dict) -> None:
     """Write a detector file."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    write_arrays(path, compressed=True, **arrays)
 
 
 def load_detector(path: str | Path) -> ContourDetector:
@@ -133,14 +131,13 @@ def load_detector(path: str | Path) -> ContourDetector:
     }
     expected = f"a contour detector of format {FORMAT_VERSION}"
     hint = "Remove the file and run again: the detector is trained anew."
+    arrays = read_arrays(path, "contour detector", error=ModelFileError)
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {key: data[key] for key in data.files}
         version, kind = int(arrays["format_version"]), str(arrays["kind"])
         if version != FORMAT_VERSION or kind not in kinds:
             raise ModelFileError(f"format {version}, kind {kind}", expected, hint, path=path)
         if kind == "boosted" and tuple(arrays["channels"]) != CHANNELS:
             raise ModelFileError("other image channels", expected, hint, path=path)
         return kinds[kind](arrays)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise ModelFileError(f"an unreadable file ({error})", expected, hint, path=path) from error
+    except KeyError as error:
+        raise ModelFileError(f"a file without {error}", expected, hint, path=path) from error

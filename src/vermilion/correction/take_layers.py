@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
+from vermilion.arrays import write_arrays
 from vermilion.correction.head import align_frames, head_from_world
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.files import atomic_path
 from vermilion.quality import QualityRow
 
 
@@ -128,11 +128,10 @@ def save_layers(
     path: str | Path, made: TakeLayers, frames: Sequence[int], mask: np.ndarray
 ) -> None:
     """Write frames (F,), layers (F, T, 9), mask (T,) and valid (F,) as `.npz`."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.savez(
-            stream,
-            frames=np.asarray(frames, dtype=np.int32),
-            layers=made.layers,
-            mask=np.asarray(mask, dtype=np.int32),
-            valid=made.valid,
-        )
+    write_arrays(
+        path,
+        frames=np.asarray(frames, dtype=np.int32),
+        layers=made.layers,
+        mask=np.asarray(mask, dtype=np.int32),
+        valid=made.valid,
+    )

@@ -6,17 +6,16 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.correspondence.lip_sides import lip_sides
 from vermilion.correspondence.registration import register, sides_of_triangles
 from vermilion.correspondence.surface_map import SurfaceMap, closest_on_surface
 from vermilion.errors import InputError
-from vermilion.files import atomic_path
 from vermilion.mesh import Mesh, triangle_normals, vertex_normals
 
 FORMAT_VERSION = 1
@@ -57,35 +56,26 @@ class Correspondence:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez_compressed(
-                stream,
-                format_version=FORMAT_VERSION,
-                vertex_triangle=self.vertices.triangle.astype(np.int32),
-                vertex_barycentric=self.vertices.barycentric.astype(np.float64),
-                triangle_triangle=self.triangles.astype(np.int32),
-                distance_mm=self.distance_mm.astype(np.float32),
-                mask=self.mask.astype(np.int32),
-                rigid=self.rigid,
-                accurate_triangles=self.accurate_triangles.astype(np.int32),
-                coarse_triangles=self.coarse_triangles.astype(np.int32),
-                coarse_neutral_mm=self.coarse_neutral_mm.astype(np.float64),
-            )
+        write_arrays(
+            path,
+            compressed=True,
+            format_version=FORMAT_VERSION,
+            vertex_triangle=self.vertices.triangle.astype(np.int32),
+            vertex_barycentric=self.vertices.barycentric.astype(np.float64),
+            triangle_triangle=self.triangles.astype(np.int32),
+            distance_mm=self.distance_mm.astype(np.float32),
+            mask=self.mask.astype(np.int32),
+            rigid=self.rigid,
+            accurate_triangles=self.accurate_triangles.astype(np.int32),
+            coarse_triangles=self.coarse_triangles.astype(np.int32),
+            coarse_neutral_mm=self.coarse_neutral_mm.astype(np.float64),
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Correspondence:
         """Read what `save` wrote. Raises InputError on a damaged file or another format."""
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {key: data[key] for key in data.files}
-            version = int(arrays["format_version"])
-        except (OSError, ValueError, EOFError, KeyError, BadZipFile) as error:
-            raise InputError(
-                f"an unreadable correspondence ({error})",
-                "a correspondence.npz of this version",
-                "Remove the file and run again.",
-                path=path,
-            ) from error
+        arrays = read_arrays(path, "correspondence")
+        version = int(arrays.get("format_version", -1))
         if version != FORMAT_VERSION:
             raise InputError(
                 f"correspondence format {version}",

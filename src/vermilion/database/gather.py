@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
+from vermilion.arrays import read_arrays
 from vermilion.database.schema import TakeEntry
 from vermilion.errors import InputError
 
@@ -62,18 +62,4 @@ def read_take_files(
 
 
 def _load(path: str | Path, needed: Sequence[str], place: Mapping) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-        missing = [name for name in needed if name not in arrays]
-    except (OSError, ValueError, EOFError, BadZipFile) as error:
-        arrays, missing = {}, [str(error)]
-    if missing:
-        raise InputError(
-            f"a file without {', '.join(missing)}",
-            f"arrays {', '.join(needed)}",
-            "Remove the file and run again.",
-            path=path,
-            **place,
-        )
-    return arrays
+    return read_arrays(path, "part of the database", needed, **place)

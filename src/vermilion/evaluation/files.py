@@ -7,30 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.evaluation.errors import ClipSums
-from vermilion.files import atomic_path
 from vermilion.sequences import read_sequence
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
     """Write `.npz` (no pickle), whole or not at all."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.savez_compressed(stream, **arrays)
+    write_arrays(path, compressed=True, **arrays)
 
 
 def load_arrays(path: str | Path) -> dict[str, np.ndarray]:
     """Read `.npz`; raises InputError where it is damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in data.files}
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(
-            f"an unreadable file ({error})",
-            "a .npz of the evaluation",
-            "Remove the file and run again.",
-            path=path,
-        ) from error
+    return read_arrays(path, "file of the evaluation")
 
 
 def save_sums(path: str | Path, sums: dict[str, ClipSums], n_frames: int) -> None:

@@ -11,14 +11,13 @@ A model plays one of three parts; each adapter (`procedural`, `ict`) builds all 
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.errors import ModelFileError
-from vermilion.files import atomic_path
 
 FORMAT_VERSION = 1
 
@@ -98,36 +97,27 @@ class FaceModel:
     def save(self, path: str | Path) -> None:
         """Write `.npz` (no pickle), whole or not at all."""
         regions = np.stack([self.regions[name] for name in REGIONS]).astype(bool)
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez_compressed(
-                stream,
-                format_version=FORMAT_VERSION,
-                name=self.name,
-                neutral_mm=self.neutral_mm.astype(np.float64),
-                triangles=self.triangles.astype(np.int32),
-                expression_names=np.array(self.expression_names, dtype=str),
-                expressions_mm=self.expressions_mm.astype(np.float32),
-                identities_mm=self.identities_mm.astype(np.float32),
-                uv=self.uv.astype(np.float32),
-                landmarks=self.landmarks.astype(np.int32),
-                outer_contour=self.outer_contour.astype(np.int32),
-                inner_contour=self.inner_contour.astype(np.int32),
-                regions=regions,
-            )
+        write_arrays(
+            path,
+            compressed=True,
+            format_version=FORMAT_VERSION,
+            name=self.name,
+            neutral_mm=self.neutral_mm.astype(np.float64),
+            triangles=self.triangles.astype(np.int32),
+            expression_names=np.array(self.expression_names, dtype=str),
+            expressions_mm=self.expressions_mm.astype(np.float32),
+            identities_mm=self.identities_mm.astype(np.float32),
+            uv=self.uv.astype(np.float32),
+            landmarks=self.landmarks.astype(np.int32),
+            outer_contour=self.outer_contour.astype(np.int32),
+            inner_contour=self.inner_contour.astype(np.int32),
+            regions=regions,
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> FaceModel:
         """Read what `save` wrote. Raises ModelFileError on a newer or damaged file."""
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {key: data[key] for key in data.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise ModelFileError(
-                f"an unreadable face model ({error})",
-                "a .npz face model written by this version",
-                "Remove the file and run again.",
-                path=path,
-            ) from error
+        arrays = read_arrays(path, "face model", error=ModelFileError)
         version = int(arrays.get("format_version", -1))
         if version != FORMAT_VERSION:
             raise ModelFileError(

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
-from vermilion.errors import InputError
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.features.contour_features import FrameContours
 from vermilion.features.distances import NAMES
-from vermilion.files import atomic_path
 from vermilion.quality import QualityRow
 
 ARRAYS = ("frames", "features", "names", "outer_px", "inner_px", "valid", "found")
@@ -63,8 +61,7 @@ class FeatureTable:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez_compressed(stream, **{name: getattr(self, name) for name in ARRAYS})
+        write_arrays(path, compressed=True, **{name: getattr(self, name) for name in ARRAYS})
 
     @classmethod
     def load(cls, paths: str | Path | Sequence[str | Path]) -> FeatureTable:
@@ -106,13 +103,4 @@ def judge(
 
 
 def _read(path: str | Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in ARRAYS}
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise InputError(
-            f"an unreadable feature file ({error})",
-            f"a .npz with {', '.join(ARRAYS)}",
-            "Remove the file and run again.",
-            path=path,
-        ) from error
+    return read_arrays(path, "feature file", ARRAYS)

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 
+from vermilion.arrays import read_arrays
 from vermilion.camera import Camera
 from vermilion.errors import InputError
 from vermilion.frames import FrameSource
@@ -38,8 +39,7 @@ def read_views(
 
 def read_neutral(path, n_vertices: int, **place) -> np.ndarray:
     """Vertices (V, 3) mm of a registered neutral; raises InputError where they do not fit."""
-    with np.load(path, allow_pickle=False) as arrays:
-        vertices = np.asarray(arrays["vertices_mm"], dtype=np.float64)
+    vertices = read_arrays(path, "neutral", ["vertices_mm"], **place)["vertices_mm"].astype(float)
     if vertices.shape != (n_vertices, 3) or not np.isfinite(vertices).all():
         raise InputError(
             f"a neutral of shape {vertices.shape}",

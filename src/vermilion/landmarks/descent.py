@@ -12,8 +12,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.errors import ModelFileError
-from vermilion.files import atomic_path
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
@@ -130,29 +130,22 @@ class DescentDetector:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz` (no pickle), whole or not at all."""
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez(
-                stream,
-                format_version=FORMAT_VERSION,
-                mean=self.mean,
-                steps=self.steps.astype(np.float16),
-                sureness=self.sureness.astype(np.float32),
-                locator_weights=self.locator.weights,
-                locator_bias=self.locator.bias,
-                found_threshold=self.found_threshold,
-            )
+        write_arrays(
+            path,
+            format_version=FORMAT_VERSION,
+            mean=self.mean,
+            steps=self.steps.astype(np.float16),
+            sureness=self.sureness.astype(np.float32),
+            locator_weights=self.locator.weights,
+            locator_bias=self.locator.bias,
+            found_threshold=self.found_threshold,
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> DescentDetector:
         """Read what `save` wrote. Raises ModelFileError on another or damaged file."""
         hint = "Remove the file and run again."
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {key: data[key] for key in data.files}
-        except (OSError, ValueError, EOFError) as error:
-            raise ModelFileError(
-                f"an unreadable landmark model ({error})", "a .npz", hint, path=path
-            ) from error
+        arrays = read_arrays(path, "landmark model", error=ModelFileError)
         version = int(arrays.get("format_version", -1))
         if version != FORMAT_VERSION:
             raise ModelFileError(

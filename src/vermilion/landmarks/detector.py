@@ -9,8 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.files import atomic_path
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.landmarks.scheme import N_LANDMARKS
 
 
@@ -69,14 +68,13 @@ class LandmarkTrack:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez(
-                stream,
-                frames=self.frames,
-                points_px=self.points_px,
-                confidence=self.confidence,
-                valid=self.valid,
-            )
+        write_arrays(
+            path,
+            frames=self.frames,
+            points_px=self.points_px,
+            confidence=self.confidence,
+            valid=self.valid,
+        )
 
     @classmethod
     def load(cls, paths: str | Path | Sequence[str | Path]) -> LandmarkTrack:
@@ -92,13 +90,4 @@ class LandmarkTrack:
 
 
 def _read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in ("frames", "points_px", "confidence", "valid")}
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise InputError(
-            f"an unreadable landmark file ({error})",
-            "a .npz with frames, points_px, confidence, valid",
-            "Remove the file and run again.",
-            path=path,
-        ) from error
+    return read_arrays(path, "landmark file", ("frames", "points_px", "confidence", "valid"))

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.files import atomic_path
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.scheme import N_LANDMARKS
 
@@ -40,24 +39,15 @@ class LandmarkViews:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-            np.savez(
-                stream,
-                cameras=self.cameras,
-                points_px=self.points_px,
-                confidence=self.confidence,
-            )
+        write_arrays(
+            path,
+            cameras=self.cameras,
+            points_px=self.points_px,
+            confidence=self.confidence,
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> LandmarkViews:
         """Read what `save` wrote."""
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                return cls(data["cameras"], data["points_px"], data["confidence"])
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise InputError(
-                f"an unreadable file of landmark views ({error})",
-                "a .npz with cameras, points_px, confidence",
-                "Remove the file and run again.",
-                path=path,
-            ) from error
+        names = ("cameras", "points_px", "confidence")
+        return cls(**read_arrays(path, "file of landmark views", names))

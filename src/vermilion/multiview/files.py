@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.errors import InputError
-from vermilion.files import atomic_path
 from vermilion.landmarks.views import LandmarkViews
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.track import Track
@@ -90,18 +90,8 @@ def read_track(path: str | Path, frames: Sequence[int]) -> np.ndarray:
 
 
 def _save(path, **arrays) -> None:
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.savez(stream, **arrays)
+    write_arrays(path, **arrays)
 
 
 def _load(path, names) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in names}
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise InputError(
-            f"an unreadable file ({error})",
-            f"a .npz with {', '.join(names)}",
-            "Remove it and run again.",
-            path=path,
-        ) from error
+    return read_arrays(path, "reconstruction", names)

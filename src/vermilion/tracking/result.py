@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.arrays import read_arrays, write_arrays
 from vermilion.camera import Camera
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.files import atomic_path
 from vermilion.tracking.expression import HeadMotion
 from vermilion.tracking.identity import IdentityFit, TakeSample
 
@@ -161,18 +160,10 @@ class TrackedTake:
 
 def _save(path: str | Path, record) -> None:
     arrays = {item.name: np.asarray(getattr(record, item.name)) for item in fields(record)}
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.savez(stream, **arrays)
+    write_arrays(path, **arrays)
 
 
 def _load(path: str | Path, kind: type) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {item.name: data[item.name] for item in fields(kind)}
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise InputError(
-            f"an unreadable tracking file ({error})",
-            f"a .npz of {kind.__name__}",
-            "Remove the file and run again.",
-            path=path,
-        ) from error
+    return read_arrays(
+        path, f"{kind.__name__} of the tracker", [item.name for item in fields(kind)]
+    )
