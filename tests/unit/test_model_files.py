@@ -34,7 +34,9 @@ def model():
     rng = np.random.default_rng(0)
     features, layers = rng.normal(size=(60, 3)), rng.normal(size=(60, 18)).astype(np.float32)
     persons = np.repeat([0, 1], 30)
-    estimator = RBFNetwork(0.1, 0.3, feature_groups=["shape", "distances", "distances"], reach=0.2)
+    estimator = RBFNetwork(
+        0.1, 0.3, feature_groups=["shape", "distances", "distances"], reach=0.2, fade=3.0
+    )
     return LipModel(
         name="MS",
         estimator=estimator.fit(features, layers, persons, persons=persons),

@@ -129,15 +129,18 @@ def test_a_group_keeps_its_proportions_and_weighs_as_much_as_any_other(data):
 
 
 @pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor])
-def test_features_beyond_the_reach_count_as_its_border(data, kind):
+def test_beyond_the_reach_the_prediction_is_drawn_to_the_mean(data, kind):
     features, targets = data
     low, high = features.min(axis=0), features.max(axis=0)
-    border = kind(reach=0.5).fit(features, targets)
-    edge = high + 0.5 * (high - low)
-    np.testing.assert_allclose(border.predict(edge[None] + 50), border.predict(edge[None]))
+    regressor = kind(reach=0.5).fit(features, targets)
     free = kind().fit(features, targets)
-    np.testing.assert_allclose(free.predict(features), border.predict(features))
-    assert not np.allclose(free.predict(edge[None] + 5), free.predict(edge[None]))
+    np.testing.assert_allclose(free.predict(features), regressor.predict(features))
+    edge = (high + 0.5 * (high - low))[None]
+    np.testing.assert_allclose(regressor.predict(edge), free.predict(edge))
+    mean = targets.mean(axis=0)
+    away = [np.linalg.norm(regressor.predict(edge + step) - mean) for step in (0, 2, 10, 1e6)]
+    assert np.all(np.diff(away) < 0)
+    assert away[-1] < 1e-6
 
 
 def test_a_constant_feature_says_nothing(data):

@@ -57,8 +57,14 @@ class TrainingConfig(StageConfig):
         0.0,
         ge=0.0,
         description="How far beyond the range of the training a feature counts, as a share of that "
-        "range; further out it is held. A large number gives the paper's regressors, which fall back "
-        "to their bias (RBF) or run away (affine) there.",
+        "range. Further out it is held, and the prediction is drawn to the mean of the training. A "
+        "large number gives the paper's regressors, which fall back to their bias (RBF) or run away "
+        "(affine) there.",
+    )
+    fade: Positive = Field(
+        2.0,
+        description="How far beyond the reach half of the prediction is left, in distances of the "
+        "training from its mean (root mean square of the scaled features).",
     )
     choice: Literal["simplest", "least"] = Field(
         "least",

@@ -28,13 +28,15 @@ def read_take_files(
 
     Args:
         row: subject, take, fps, split, and `train`, the frame numbers that train.
-        layer_paths, feature_paths: chunk files with `frames`, `valid` and `layers` or `features`.
+        layer_paths, feature_paths: chunk files with `frames`, `valid` and `layers`, or `features` and `names`.
 
     Raises InputError where the chunks disagree about frames or features.
     """
     place = {"subject": row["subject"], "take": row["take"]}
     layers = [_load(path, ("frames", "layers", "valid"), place) for path in layer_paths]
-    features = [_load(path, ("frames", "features", "valid"), place) for path in feature_paths]
+    features = [
+        _load(path, ("frames", "features", "names", "valid"), place) for path in feature_paths
+    ]
     frames = np.concatenate([part["frames"] for part in layers])
     others = np.concatenate([part["frames"] for part in features])
     if not np.array_equal(frames, others):
@@ -57,8 +59,7 @@ def read_take_files(
         valid=valid,
         train=np.isin(frames, row["train"]),
     )
-    names = features[0].get("names", np.array([f"feature_{i}" for i in range(values.shape[1])]))
-    return TakeFiles(entry, tuple(str(name) for name in names))
+    return TakeFiles(entry, tuple(str(name) for name in features[0]["names"]))
 
 
 def _load(path: str | Path, needed: Sequence[str], place: Mapping) -> dict[str, np.ndarray]:

@@ -18,7 +18,7 @@ from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
 from vermilion.regression.ridge import person_averages
-from vermilion.regression.scaling import feature_range, feature_scale
+from vermilion.regression.scaling import feature_range, feature_scale, trust
 
 Rule = Literal["simplest", "least"]
 
@@ -115,6 +115,7 @@ def cross_validate_rbf(
     prototype_minimum: int = 20,
     feature_groups: Sequence[str] | None = None,
     reach: float = np.inf,
+    fade: float = 2.0,
     persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `RBFNetwork` on a grid.
@@ -133,11 +134,12 @@ def cross_validate_rbf(
 
     def design_of(beta: float) -> DesignOfFold:
         def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            scaled = _scaled(features, train, feature_groups, reach)
+            scaled, counts = _scaled(features, train, feature_groups, reach, fade)
             chosen = temporal_prototypes(sequences[train], prototype_stride, prototype_minimum)
             prototypes = scaled[train[chosen]]
             activations = gaussian_activations(scaled, prototypes, beta)
-            return activations[train], activations[held]
+            mean = activations[train].mean(axis=0)
+            return activations[train], (mean + counts * (activations - mean))[held]
 
         return design
 
@@ -163,14 +165,16 @@ def cross_validate_affine(
     n_folds: int = 5,
     feature_groups: Sequence[str] | None = None,
     reach: float = np.inf,
+    fade: float = 2.0,
     persons: np.ndarray | None = None,
 ) -> Curve:
     """Errors of `AffineRegressor` for every alpha; arguments as `cross_validate_rbf`."""
     persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
 
     def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        scaled = _scaled(features, train, feature_groups, reach)
-        return scaled[train], scaled[held]
+        scaled, counts = _scaled(features, train, feature_groups, reach, fade)
+        mean = scaled[train].mean(axis=0)
+        return scaled[train], (mean + counts * (scaled - mean))[held]
 
     errors, frames = _fold_errors(design, gram, clips, persons, alphas, n_folds, n_outputs)
     freedom = _degrees_of_freedom(design, len(features), alphas)[None]
@@ -189,12 +193,13 @@ def _degrees_of_freedom(
 
 
 def _scaled(
-    features: np.ndarray, train: np.ndarray, groups: Sequence[str] | None, reach: float
-) -> np.ndarray:
-    """All features in the scale and reach of the rows trained on."""
+    features: np.ndarray, train: np.ndarray, groups: Sequence[str] | None, reach: float, fade: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """All features (F, M) in the scale and reach of the rows trained on, and their trust (F, 1)."""
     mean, scale = feature_scale(features[train], groups)
     scaled = (features - mean) / scale
-    return np.clip(scaled, *feature_range(scaled[train], reach))
+    within = np.clip(scaled, *feature_range(scaled[train], reach))
+    return within, trust(scaled, within, fade)
 
 
 def _fold_errors(

@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from vermilion.regression.ridge import ridge_weights
-from vermilion.regression.scaling import feature_range, feature_scale
+from vermilion.regression.scaling import feature_range, feature_scale, trust
 
 
 class _LinearOutputs(RegressorMixin, BaseEstimator):
@@ -19,18 +19,20 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
     def _design(self, scaled: np.ndarray) -> np.ndarray:
         raise NotImplementedError
 
-    def scaled(self, features: np.ndarray, held: bool = True) -> np.ndarray:
-        """Features (F, M) in the estimator's own scale, float64; `held` within its reach."""
+    def scaled(self, features: np.ndarray) -> np.ndarray:
+        """Features (F, M) in the estimator's own scale, float64."""
         check_is_fitted(self)
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or features.shape[1] != self.n_features_in_:
             raise ValueError(f"features must be (F, {self.n_features_in_}), got {features.shape}")
-        scaled = (features - self.feature_mean_) / self.feature_scale_
-        return np.clip(scaled, self.feature_low_, self.feature_high_) if held else scaled
+        return (features - self.feature_mean_) / self.feature_scale_
 
     def activations(self, features: np.ndarray) -> np.ndarray:
-        """Design matrix (F, P) of features (F, M)."""
-        return self._design(self.scaled(features))
+        """Design matrix (F, P) of features (F, M), drawn to its mean beyond the reach."""
+        scaled = self.scaled(features)
+        held = np.clip(scaled, self.feature_low_, self.feature_high_)
+        added = self._design(held) - self.mean_activation_
+        return self.mean_activation_ + trust(scaled, held, self.fade) * added
 
     def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
         """Outputs (F, K), in the precision of the weights; `person` as labelled in `fit`."""
@@ -62,6 +64,7 @@ class _LinearOutputs(RegressorMixin, BaseEstimator):
     def _fit_outputs(
         self, design: np.ndarray, targets: np.ndarray, persons: np.ndarray | None
     ) -> None:
+        self.mean_activation_ = design.mean(axis=0)
         weights, biases = ridge_weights(design, targets, self.alpha, persons=persons)
         self.weights_ = weights
         self.person_biases_ = biases.astype(weights.dtype)
@@ -82,9 +85,10 @@ class RBFNetwork(_LinearOutputs):
         prototype_minimum: at least so many prototypes where there are as many frames.
         feature_groups: labels of the features that share a scale, or None.
         reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
+        fade: how far further half of the prediction is left (`scaling.trust`).
 
     Attributes (fitted): `prototypes_` (N, M) scaled, `weights_` (N, K), `person_biases_` (G, K),
-    `bias_` (K,) of anybody else, `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
+    `bias_` (K,) of anybody else, `mean_activation_` (N,), `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
     """
 
     def __init__(
@@ -95,6 +99,7 @@ class RBFNetwork(_LinearOutputs):
         prototype_minimum: int = 20,
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
+        fade: float = 2.0,
     ):
         self.alpha = alpha
         self.beta = beta
@@ -102,6 +107,7 @@ class RBFNetwork(_LinearOutputs):
         self.prototype_minimum = prototype_minimum
         self.feature_groups = feature_groups
         self.reach = reach
+        self.fade = fade
 
     def fit(
         self,
@@ -141,6 +147,7 @@ class AffineRegressor(_LinearOutputs):
         alpha: ridge parameter of the linear part.
         feature_groups: labels of the features that share a scale, or None.
         reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
+        fade: how far further half of the prediction is left (`scaling.trust`).
     """
 
     def __init__(
@@ -148,10 +155,12 @@ class AffineRegressor(_LinearOutputs):
         alpha: float = 2.0,
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
+        fade: float = 2.0,
     ):
         self.alpha = alpha
         self.feature_groups = feature_groups
         self.reach = reach
+        self.fade = fade
 
     def fit(
         self,

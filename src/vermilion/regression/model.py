@@ -28,11 +28,12 @@ _COMMON = (
     "feature_scale_",
     "feature_low_",
     "feature_high_",
+    "mean_activation_",
 )
 _ARRAYS = {"rbf": ("prototypes_", *_COMMON), "affine": _COMMON}
 _SETTINGS = {
-    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum", "reach"),
-    "affine": ("alpha", "reach"),
+    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum", "reach", "fade"),
+    "affine": ("alpha", "reach", "fade"),
 }
 
 
@@ -105,7 +106,7 @@ class LipModel:
         The distance to the nearest prototype (to the mean, for an affine regressor) in units where
         two training frames are 1.4 apart in the root mean square.
         """
-        scaled = self.estimator.scaled(self._chosen(features), held=False)
+        scaled = self.estimator.scaled(self._chosen(features))
         known = getattr(self.estimator, "prototypes_", np.zeros((1, scaled.shape[1])))
         return np.sqrt(((scaled[:, None] - known[None]) ** 2).sum(axis=2).min(axis=1))
 

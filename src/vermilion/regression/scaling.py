@@ -50,3 +50,12 @@ def feature_range(scaled: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndar
     if np.isinf(reach):
         return np.full_like(low, -np.inf), np.full_like(high, np.inf)
     return low - reach * (high - low), high + reach * (high - low)
+
+
+def trust(scaled: np.ndarray, held: np.ndarray, fade: float) -> np.ndarray:
+    """How much a prediction counts whose features (F, M) had to be held within the reach, (F, 1).
+
+    1 / (1 + (d / fade)^2) of the distance d by which they were held, in units where the training
+    lies 1 from its mean in the root mean square.
+    """
+    return 1.0 / (1.0 + ((scaled - held) ** 2).sum(axis=1, keepdims=True) / fade**2)

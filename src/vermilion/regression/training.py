@@ -44,6 +44,7 @@ class Selection:
     folds: int = 5
     clip_frames: int = 30
     reach: float = 0.0
+    fade: float = 2.0
     choice: Rule = "least"
     bias: Literal["person", "shared"] = "person"
 
@@ -116,13 +117,14 @@ def train(
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
     persons = data.persons if selection.bias == "person" else None
     common = {"n_folds": selection.folds, "feature_groups": groups, "persons": persons}
-    common["reach"] = selection.reach
+    beyond = {"reach": selection.reach, "fade": selection.fade}
+    common |= beyond
     if estimator_kind == "affine":
         curve = cross_validate_affine(
             features, gram, weights.sum(), clips, alphas=sorted(selection.affine_alphas), **common
         )
         _, chosen = curve.choose(selection.choice)
-        estimator = AffineRegressor(float(curve.alphas[chosen]), groups, selection.reach)
+        estimator = AffineRegressor(float(curve.alphas[chosen]), groups, **beyond)
         estimator.fit(features, data.layers, persons=persons)
     else:
         prototypes = {
