@@ -29,8 +29,8 @@ def apply_exports():
 
 
 def applied_takes():
-    """Takes to be corrected, `subject/take`: those named, or all that have no tattoo."""
-    rows = takes(("video", "tracked"))
+    """Takes to be corrected, `subject/take`: those named, or all of role `video`."""
+    rows = takes("video")
     return CONFIG.apply.takes or [
         take.name for take in rows if take.name not in CONFIG.landmarks.training_takes
     ]

@@ -31,7 +31,7 @@ def evaluated_takes():
     people = set(subjects("tattoo"))
     return [
         take
-        for take in takes(("tattoo", "video", "tracked"))
+        for take in takes(("tattoo", "video"))
         if take.test_frames() and take.subject in people
         if take.role == "tattoo" or has_truth(take)
     ]

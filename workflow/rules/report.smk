@@ -18,7 +18,7 @@ STAGE_FOLDERS = {
     "landmarks": ("tattoo", "video"),
     "tracking": ("tattoo", "video"),
     "contours": ("tattoo", "video"),
-    "correction/features": ("tattoo", "video", "tracked"),
+    "correction/features": ("tattoo", "video"),
     "correction": ("tattoo",),
 }
 

@@ -109,6 +109,12 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"{origin}, key apply.takes: found '{name}'; expected a take of the "
                 f"sheet, written subject/take: {', '.join(by_name) or 'none there'}."
             )
+    for name in configuration.apply.takes:
+        if name in by_name and by_name[name].role not in ("video", "tattoo"):
+            problems.append(
+                f"{origin}, key apply.takes: found '{name}' of role {by_name[name].role}; expected "
+                "role video or tattoo. Only these have the features that a regressor needs."
+            )
     for name in configuration.landmarks.training_takes:
         if name not in by_name:
             problems.append(
