@@ -38,7 +38,7 @@ class ApplyConfig(StageConfig):
 
     takes: list[str] = Field(
         [],
-        description="Takes to correct, each written `subject/take`; any take that is tracked.",
+        description="Takes to correct, each written `subject/take`. Empty: every take of role `video`.",
     )
     regressor: str = Field(
         "MS",
