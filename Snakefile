@@ -26,17 +26,14 @@ include: "workflow/rules/training.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/apply.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/targets.smk"
 
 
 rule all:
     """Everything: database, regressors, measures, corrected videos, the summary."""
     default_target: True
     input:
-        R + "/database/lips.h5",
-        R + "/evaluation/measures.tsv",
-        R + "/evaluation/summary.html",
-        R + "/quality.tsv",
-        apply_outputs(),
+        all_outputs(),
 
 
 rule captures:

@@ -23,7 +23,8 @@ def ended(path):
 
 
 def outputs(results):
-    return [results / "a.npy", results / "folder"]
+    """Each output is its own job."""
+    return {path: path for path in (results / "a.npy", results / "folder")}
 
 
 def test_untouched_results_are_whole(results):
@@ -74,3 +75,12 @@ def test_rerun_output_is_recorded_anew(results):
     (results / "a.npy").write_bytes(b"c" * 500)
     assert record(results, outputs(results), ended) == []
     assert find_damage(results) == []
+
+
+def test_outputs_of_a_job_go_together(results):
+    first = results / "a.npy"
+    record(results, {first: first, results / "folder": first}, ended)
+    (results / "folder" / "1.png").write_bytes(b"uno")
+    damage = find_damage(results)
+    assert [d.path.name for d in damage] == ["1.png"]
+    assert remove_damaged(results, damage) == [first, results / "folder"]

@@ -36,11 +36,6 @@ def applied_takes():
     ]
 
 
-def apply_outputs():
-    """The overlay videos, and with them all files, of the takes to be corrected."""
-    return [f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()]
-
-
 rule apply:
     """Corrects a chunk of a take and draws original, base and corrected side by side."""
     input:

@@ -152,14 +152,14 @@ def record_checksums():
     """Write the ledger of checksums for every output whose job has ended."""
     if not IS_MAIN_PROCESS or workflow.dryrun:
         return
-    outputs = {}
+    jobs, ends = {}, {}
     for job in workflow.dag.jobs:
         for output in job.output:
-            if str(output).startswith(f"{R}/") and Path(output).exists():
-                outputs[Path(output)] = workflow.persistence.metadata(output)
-    refused = checksums.record(
-        Path(R), sorted(outputs), lambda path: getattr(outputs[path], "endtime", None)
-    )
+            path = Path(output)
+            if str(output).startswith(f"{R}/") and path.exists():
+                jobs[path] = Path(job.output[0])
+                ends[path] = getattr(workflow.persistence.metadata(output), "endtime", None)
+    refused = checksums.record(Path(R), jobs, ends.get)
     for damage in refused:
         print(
             f"not to be trusted: {damage.path} ({damage.reason}); run `make verify`",

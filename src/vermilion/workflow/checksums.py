@@ -19,8 +19,7 @@ from vermilion.files import sha256_of
 from vermilion.tables import read_table, write_table
 
 LEDGER = "checksums.tsv"
-#: Folders of a results folder whose files are no results.
-LEFT_OUT = ("logs", "benchmarks")
+COLUMNS = ("path", "bytes", "mtime_ns", "sha256", "output", "job")
 #: Two clocks and a file system's rounding lie between a file's time and its job's recorded end.
 CLOCK_SLACK_S = 0.05
 
@@ -34,7 +33,7 @@ class Damage:
 
 
 def record(
-    results: Path, outputs: list[Path], finished_at: Callable[[Path], float | None]
+    results: Path, jobs: dict[Path, Path], finished_at: Callable[[Path], float | None]
 ) -> list[Damage]:
     """Bring the ledger up to date after a run; returns what must not be trusted.
 
@@ -43,13 +42,14 @@ def record(
 
     Args:
         results: the results folder.
-        outputs: declared outputs, files or folders.
+        jobs: each declared output, file or folder -> first output of the job that writes it, which
+            stands for the job.
         finished_at: recorded end of the job that wrote an output, seconds since the epoch, or None
             where no finished job is known.
     """
     known = _read(results)
     entries, refused = {}, []
-    for output in outputs:
+    for output, job in sorted(jobs.items()):
         end = finished_at(output)
         for path in _files_of(output):
             name = path.relative_to(results).as_posix()
@@ -63,14 +63,14 @@ def record(
                     "mtime_ns": state.st_mtime_ns,
                     "sha256": sha256_of(path),
                     "output": output.relative_to(results).as_posix(),
+                    "job": job.relative_to(results).as_posix(),
                 }
             else:
                 refused.append(Damage(path, "changed after its job had ended"))
                 if entry:
                     entries[name] = entry
     rows = [{"path": name, **entries[name]} for name in sorted(entries)]
-    columns = ["path", "bytes", "mtime_ns", "sha256", "output"]
-    write_table(results / LEDGER, pd.DataFrame(rows, columns=columns))
+    write_table(results / LEDGER, pd.DataFrame(rows, columns=list(COLUMNS)))
     return refused
 
 
@@ -91,23 +91,26 @@ def find_damage(results: Path) -> list[Damage]:
 
 
 def remove_damaged(results: Path, damage: list[Damage]) -> list[Path]:
-    """Remove the outputs that hold damaged files; returns what was removed."""
-    outputs = {
-        results / _read(results)[d.path.relative_to(results).as_posix()]["output"] for d in damage
-    }
-    for output in sorted(outputs):
+    """Remove all outputs of the jobs that wrote damaged files; returns what was removed.
+
+    A job makes its outputs together, so they go together: the next run misses the first of them.
+    """
+    known = _read(results)
+    jobs = {known[item.path.relative_to(results).as_posix()]["job"] for item in damage}
+    outputs = sorted({results / e["output"] for e in known.values() if e["job"] in jobs})
+    for output in outputs:
         if output.is_dir():
             shutil.rmtree(output)
         else:
             output.unlink(missing_ok=True)
-    return sorted(outputs)
+    return outputs
 
 
 def _read(results: Path) -> dict[str, dict]:
     path = results / LEDGER
     if not path.is_file():
         return {}
-    table = read_table(path, ("path", "bytes", "mtime_ns", "sha256", "output"))
+    table = read_table(path, COLUMNS)
     return {row.pop("path"): row for row in table.to_dict("records")}
 
 
