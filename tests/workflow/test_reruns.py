@@ -21,7 +21,7 @@ AFTER_TRACKING = AFTER_CONTOURS | {
     "tracking_meshes", "correspondence", "layers", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
-    "landmarks", "identity", "tracking", "contour_detector", "contours",
+    "landmarks", "identity", "tracking", "tracking_topology", "contour_detector", "contours",
 }  # fmt: skip
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
@@ -68,11 +68,11 @@ def test_ridge_parameter(finished):
 
 def test_feather_width(finished):
     def change(content):
-        content.setdefault("inpaint", {})["composite"] = {"feather_mm": 1.234}
+        content.setdefault("inpaint", {})["mask"] = {"feather_mm": 1.25}
 
     with configured(finished, change):
         jobs = finished.would_run()
-    assert set(jobs) == AFTER_INPAINT | {"inpaint"}
+    assert set(jobs) == AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 
 
 def test_contour_label(finished):
@@ -117,7 +117,7 @@ def test_line_of_code_in_the_tracking_module(finished):
     path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
         jobs = set(finished.would_run())
-    assert jobs - {"identity"} == AFTER_TRACKING | {"tracking"}
+    assert jobs == AFTER_TRACKING | {"identity", "tracking", "tracking_topology"}
 
 
 def test_camera_file(finished):
