@@ -27,7 +27,7 @@ demo: CONFIG = config/config.yaml
 demo: run
 
 run: $(READY)
-	$(BIN)/snakemake --configfile $(CONFIG)
+	$(BIN)/snakemake --configfile $(CONFIG) --quiet rules reason host
 	@$(MAKE) --no-print-directory report CONFIG=$(CONFIG)
 
 report: $(READY)

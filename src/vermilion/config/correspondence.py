@@ -48,7 +48,7 @@ class CorrespondenceConfig(StageConfig):
         "(degrees).",
     )
     mask_radius_mm: float = Field(
-        80.0,
+        95.0,
         gt=10.0,
         le=150.0,
         description="Reach of the correction layer from the middle of the mouth (mm). The face "

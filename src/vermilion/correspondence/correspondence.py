@@ -109,7 +109,7 @@ def find_correspondence(
     *,
     coarse_regions: Mapping[str, np.ndarray] | None = None,
     accurate_regions: Mapping[str, np.ndarray] | None = None,
-    mask_radius_mm: float = 80.0,
+    mask_radius_mm: float = 95.0,
     max_distance_mm: float = 4.0,
     max_angle_deg: float = 70.0,
     **registration,

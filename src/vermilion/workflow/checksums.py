@@ -110,7 +110,9 @@ def _read(results: Path) -> dict[str, dict]:
     path = results / LEDGER
     if not path.is_file():
         return {}
-    table = read_table(path, COLUMNS)
+    table = read_table(path)
+    if list(table.columns) != list(COLUMNS):
+        return {}  # of another version: it is written anew
     return {row.pop("path"): row for row in table.to_dict("records")}
 
 
