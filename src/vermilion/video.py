@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 
 from vermilion.errors import InputError
@@ -107,9 +108,12 @@ def write_video(path: str | Path, pictures: Iterable[np.ndarray], fps: float) ->
             if not started:
                 stream.width, stream.height = width, height
                 started = True
-            frame = av.VideoFrame.from_ndarray(
-                np.ascontiguousarray(picture[:height, :width]), format="rgb24"
+            # FFmpeg's own conversion reads past the end of rows whose width is no multiple of 16,
+            # so that the last columns would differ from run to run.
+            planes = cv2.cvtColor(
+                np.ascontiguousarray(picture[:height, :width]), cv2.COLOR_RGB2YUV_I420
             )
+            frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
             container.mux(stream.encode(frame))
         if started:
             container.mux(stream.encode(None))

@@ -100,3 +100,13 @@ def test_file_that_is_no_video_is_named(tmp_path):
     path.write_bytes(b"not a video")
     with pytest.raises(InputError, match=r"clip\.mp4.*unreadable video"):
         VideoReader(path)
+
+
+def test_same_pictures_give_the_same_video_whatever_the_width(tmp_path):
+    noise = np.random.default_rng(0).integers(0, 255, (43, 55, 3), dtype=np.uint8)
+    pictures = [np.roll(noise, i, axis=1) for i in range(4)]
+    for name in ("a.mp4", "b.mp4"):
+        write_video(tmp_path / name, pictures, fps=30)
+        pictures = [picture.copy() for picture in pictures]
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    assert VideoReader(tmp_path / "a.mp4").size == (54, 42)
