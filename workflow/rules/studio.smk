@@ -105,13 +105,12 @@ def studio_cameras(subject, take):
 
 
 def studio_outputs():
-    """Every picture, camera, label and truth file of the studio's takes."""
+    """Every picture, camera and label of the studio's takes; the truth comes with them."""
     paths = []
     for take in [take for take in TAKES if take.source == STUDIO]:
         for chunk in chunks(take.subject, take.take):
             paths += studio_frames(take.subject, take.take, chunk)
         paths += studio_cameras(take.subject, take.take) + studio_label_files(take)
-        paths.append(f"{R}/truth/{take.name}/vertices_mm.npy")
     return paths
 
 
