@@ -105,6 +105,11 @@ def per_chunk(pattern):
     return lambda wildcards: expand_chunks(pattern, wildcards.subject, wildcards.take)
 
 
+def first_chunk(pattern):
+    """Input function: `pattern` for the chunk of the wildcards' take that holds the neutral."""
+    return lambda wildcards: expand_chunks(pattern, wildcards.subject, wildcards.take)[0]
+
+
 def expand_chunks(pattern, subject, take):
     """`pattern` for every chunk of a take; other wildcards of the pattern are kept."""
     return [

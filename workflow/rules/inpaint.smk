@@ -18,12 +18,6 @@ def plain_path(pattern):
     return path
 
 
-def first_manifest(wildcards):
-    """The manifest of the chunk that holds the neutral of the wildcards' take."""
-    pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
-    return expand_chunks(pattern, wildcards.subject, wildcards.take)[0]
-
-
 rule plain_texture:
     """The texture of the lips without tattoo: plain_texture.exr, from all cameras of the plain take."""
     input:
@@ -58,7 +52,7 @@ rule inpaint_reference:
         plain=R + "/subjects/{subject}/plain_texture.exr",
         neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
-        manifest=first_manifest,
+        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
     output:
         reference=R + "/takes/{subject}/{take}/inpaint/reference.exr",
         overlay=R + "/takes/{subject}/{take}/inpaint/overlay/reference.png",

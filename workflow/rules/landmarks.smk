@@ -116,9 +116,7 @@ rule landmarks:
 rule landmarks_views:
     """Finds the landmarks of the neutral in every camera of a rig: views_neutral.npz."""
     input:
-        manifest=lambda wildcards: expand_chunks(
-            R + "/takes/{subject}/{take}/capture/{chunk}.json", wildcards.subject, wildcards.take
-        )[0],
+        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
         cameras=R + "/takes/{subject}/{take}/cameras",
         detector=detector_files,
     output:

@@ -1,19 +1,13 @@
 """H, the registered high-quality mesh sequence of a rig's take (Lips16 3.1, Beeler et al. 2011)."""
 
 
-def neutral_manifest(wildcards):
-    """The manifest of the chunk that holds the neutral: the first."""
-    pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
-    return expand_chunks(pattern, wildcards.subject, wildcards.take)[0]
-
-
 rule multiview_neutral:
     """Registers the template to the take's first frame: neutral.npz and its cloud (Lips16 3.1)."""
     input:
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
         landmarks=R + "/takes/{subject}/{take}/landmarks/views_neutral.npz",
-        manifest=neutral_manifest,
+        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
     output:
         neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
         cloud=R + "/takes/{subject}/{take}/multiview/cloud_neutral.ply",
@@ -68,7 +62,7 @@ rule multiview_refine:
         cameras=R + "/takes/{subject}/{take}/cameras",
         neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
         track=R + "/takes/{subject}/{take}/multiview/track.npz",
-        first_manifest=neutral_manifest,
+        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
         manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
     output:
         meshes=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",

@@ -9,8 +9,9 @@ from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import write_texture
 from vermilion.inpaint.overlay import texture_sheet
-from vermilion.inpaint.views import read_neutral, read_views
+from vermilion.inpaint.views import read_views
 from vermilion.logfile import log_to
+from vermilion.multiview.files import read_neutral
 
 
 def main(snakemake):

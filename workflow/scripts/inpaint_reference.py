@@ -10,8 +10,9 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture, write_texture
 from vermilion.inpaint.overlay import texture_sheet
 from vermilion.inpaint.tattoo import feathered, tattoo_mask
-from vermilion.inpaint.views import read_neutral, read_views
+from vermilion.inpaint.views import read_views
 from vermilion.logfile import log_to
+from vermilion.multiview.files import read_neutral
 
 
 def main(snakemake):

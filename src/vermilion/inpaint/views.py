@@ -6,7 +6,6 @@ import sys
 
 import numpy as np
 
-from vermilion.arrays import read_arrays
 from vermilion.camera import Camera
 from vermilion.errors import InputError
 from vermilion.frames import FrameSource
@@ -35,17 +34,3 @@ def read_views(
                 raise
             print(f"left out: {error}", file=sys.stderr)
     return views
-
-
-def read_neutral(path, n_vertices: int, **place) -> np.ndarray:
-    """Vertices (V, 3) mm of a registered neutral; raises InputError where they do not fit."""
-    vertices = read_arrays(path, "neutral", ["vertices_mm"], **place)["vertices_mm"].astype(float)
-    if vertices.shape != (n_vertices, 3) or not np.isfinite(vertices).all():
-        raise InputError(
-            f"a neutral of shape {vertices.shape}",
-            f"({n_vertices}, 3) finite numbers",
-            "It was registered with another template: remove it and run again.",
-            path=path,
-            **place,
-        )
-    return vertices

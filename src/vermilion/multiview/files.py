@@ -49,15 +49,17 @@ def write_neutral(path: str | Path, neutral: Neutral) -> None:
     )
 
 
-def read_neutral(path: str | Path, n_vertices: int) -> np.ndarray:
-    """Vertices (V, 3) mm of `write_neutral`; raises InputError for another topology."""
-    vertices = _load(path, ("vertices_mm",))["vertices_mm"]
-    if vertices.shape != (n_vertices, 3):
+def read_neutral(path: str | Path, n_vertices: int, **place) -> np.ndarray:
+    """Vertices (V, 3) mm of `write_neutral`; raises InputError, with the `place`, for another
+    topology or numbers that are not finite."""
+    vertices = read_arrays(path, "neutral", ("vertices_mm",), **place)["vertices_mm"]
+    if vertices.shape != (n_vertices, 3) or not np.isfinite(vertices).all():
         raise InputError(
             f"a neutral of shape {vertices.shape}",
-            f"({n_vertices}, 3), the template's vertices",
+            f"({n_vertices}, 3) finite numbers, the template's vertices",
             "The template has changed: remove the file and run again.",
             path=path,
+            **place,
         )
     return vertices
 
