@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -20,8 +20,16 @@ from vermilion.errors import ModelFileError
 FORMAT_VERSION = 1
 
 
-class ContourDetector(Protocol):
-    """Finds lip contours in each picture by itself, so that chunks do not matter."""
+class ContourDetector(ABC):
+    """Finds lip contours in each picture by itself, so that chunks do not matter.
+
+    Attributes:
+        interocular_size_px: inter-ocular distance of the region that is looked at.
+        margin: of the region round the mouth, per inter-ocular distance.
+    """
+
+    interocular_size_px: float
+    margin: float
 
     def likelihood(
         self, linear_rgb: np.ndarray, landmarks_px: np.ndarray
@@ -32,10 +40,18 @@ class ContourDetector(Protocol):
             linear_rgb: (h, w, 3) float32.
             landmarks_px: (66, 2) of the face in it.
         """
+        region = mouth_region(landmarks_px, self.interocular_size_px, self.margin)
+        maps = self.region_likelihood(region.crop(linear_rgb), region)
+        inner, outer = (region.paste(maps[name], linear_rgb.shape[:2]) for name in CONTOURS)
+        return inner, outer
+
+    @abstractmethod
+    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+        """Name of the contour -> (size, size) likelihood of a cropped region."""
 
 
 @dataclass(frozen=True)
-class BoostedDetector:
+class BoostedDetector(ContourDetector):
     """Boosted edge learning (Dollar et al. 2006; Lips16 3.2.2): a forest a contour.
 
     Attributes:
@@ -49,15 +65,6 @@ class BoostedDetector:
     interocular_size_px: float
     margin: float
     smoothing_px: float = 1.0
-
-    def likelihood(
-        self, linear_rgb: np.ndarray, landmarks_px: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `ContourDetector`."""
-        region = mouth_region(landmarks_px, self.interocular_size_px, self.margin)
-        maps = self.region_likelihood(region.crop(linear_rgb), region)
-        inner, outer = (region.paste(maps[name], linear_rgb.shape[:2]) for name in CONTOURS)
-        return inner, outer
 
     def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""

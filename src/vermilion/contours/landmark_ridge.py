@@ -16,15 +16,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from vermilion.contours.channels import image_channels
-from vermilion.contours.labels import CONTOURS
+from vermilion.contours.detector import ContourDetector
 from vermilion.contours.paths import cheapest_ring
-from vermilion.contours.region import MouthRegion, mouth_region
+from vermilion.contours.region import MouthRegion
 
 STEP_PX = 0.5  # between the places along a normal, region pixels
 
 
 @dataclass(frozen=True)
-class LandmarkRidgeDetector:
+class LandmarkRidgeDetector(ContourDetector):
     """Ridges about the lips' borders near the landmarks.
 
     Attributes:
@@ -42,15 +42,6 @@ class LandmarkRidgeDetector:
     reach: float = 0.08
     edge_weight: float = 4.0
     stiffness: float = 6.0
-
-    def likelihood(
-        self, linear_rgb: np.ndarray, landmarks_px: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `ContourDetector`."""
-        region = mouth_region(landmarks_px, self.interocular_size_px, self.margin)
-        maps = self.region_likelihood(region.crop(linear_rgb), region)
-        inner, outer = (region.paste(maps[name], linear_rgb.shape[:2]) for name in CONTOURS)
-        return inner, outer
 
     def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
