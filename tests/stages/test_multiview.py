@@ -25,7 +25,8 @@ PLACE = {"subject": "s1", "take": "rom"}
 SETTINGS = MultiviewConfig(
     stereo={"reach_mm": 30, "speckle_px": 50},
     neutral={"first_gate_mm": 6, "last_gate_mm": 2, "rounds": 5, "poisson_depth": 6},
-    track={"scale": 1.0},
+    # the small mouth fills the pictures, so that frames look less alike
+    track={"scale": 1.0, "anchor_similarity": 0.2},
     refine={"scales": [1.0, 1.0], "cloud_scale": 1.0},
 )
 CFG = {f"multiview.{key}": value for key, value in SETTINGS.model_dump(mode="json").items()}
@@ -86,12 +87,44 @@ def neutral(root):
 
 
 def track(root):
+    """The coarse track, of one clip."""
+    join(root, [clip(root, 0, [])], [])
+
+
+def anchors(root, windows, source="rom"):
+    """Anchors 1, 2, ... of windows of frames."""
+    paths = []
+    for index, window in enumerate(windows, start=1):
+        paths.append(root / f"anchors/{source}/{index:04d}.npz")
+        run_script(
+            "multiview_anchor",
+            wildcards={**PLACE, "clip": f"{index:04d}"},
+            params={"cfg": CFG, "source": str(root / source), "neutral": 0, "window": window},
+            input=inputs(root),
+            output={"anchor": paths[-1]},
+        )
+    return paths
+
+
+def clip(root, index, anchors, source="rom"):
+    path = root / f"clips/{source}/{len(anchors)}/{index:04d}.npz"
+    run_script(
+        "multiview_clip",
+        wildcards={**PLACE, "clip": f"{index:04d}"},
+        params={"cfg": CFG, "source": str(root / source), "frames": [0, 3]},
+        input={**inputs(root), "anchors": anchors},
+        output={"clip": path},
+    )
+    return path
+
+
+def join(root, clips, anchors, name="track"):
     run_script(
         "multiview_track",
         wildcards=PLACE,
-        params={"cfg": CFG, "source": str(root / "rom"), "frames": [0, 3]},
-        input=inputs(root),
-        output={"track": root / "track.npz", "topology": root / "topology.ply"},
+        params={},
+        input={**inputs(root), "clips": clips, "anchors": anchors},
+        output={"track": root / f"{name}.npz", "topology": root / "topology.ply"},
     )
 
 
@@ -150,6 +183,38 @@ def test_vertices_stay_on_their_material_points(take):
         motion = (lip_patch.vertices_at(*pose) - rest)[near]
         drift = np.linalg.norm(vertices - meshes[0] - motion, axis=1)[lips]
         assert drift.mean() < 0.4
+
+
+def test_clips_between_anchors_join_into_a_track_that_passes_through_them(take):
+    found = anchors(take, [[2, 3]])
+    frame = int(np.load(found[0])["frame"])
+    assert frame == 2  # more like the neutral than frame 3
+    join(take, [clip(take, index, found) for index in (0, 1)], found, "joined")
+    joined, single = (np.load(take / f"{name}.npz") for name in ("joined", "track"))
+    assert joined["frames"].tolist() == [0, 1, 2, 3]
+    assert joined["anchors"].tolist() == [True, False, True, False]
+    assert np.isfinite(joined["similarity"]).tolist() == [True, False, True, True]
+    anchor = np.load(found[0])["vertices_mm"].astype(np.float32)
+    assert np.array_equal(joined["coarse_mm"][2], anchor)
+    off = np.linalg.norm(joined["coarse_mm"] - single["coarse_mm"], axis=2)
+    assert np.median(off) < 0.2
+
+
+def test_a_border_without_an_anchor_joins_its_clips(take):
+    """Frames that cannot be read are no anchors."""
+    (take / "dark").mkdir(exist_ok=True)
+    for camera in lip_patch.cameras():
+        folder = take / f"dark/frames/{camera}"
+        folder.mkdir(parents=True)
+        whole = take / f"rom/frames/{camera}/000000.png"
+        (folder / "000000.png").write_bytes(whole.read_bytes())
+    found = anchors(take, [[2, 3]], source="dark")
+    assert int(np.load(found[0])["frame"]) == -1
+    clips = [clip(take, index, found, source="dark") for index in (0, 1)]
+    join(take, clips, found, "dark_track")
+    track = np.load(take / "dark_track.npz")
+    assert track["anchors"].tolist() == [True, False, False, False]
+    assert track["reasons"][0] == "" and all("frame" in why for why in track["reasons"][1:])
 
 
 def test_topology_and_visibility_lie_beside_the_meshes(take):

@@ -7,8 +7,8 @@ import pytest
 
 from vermilion.camera import look_at, pinhole
 from vermilion.errors import InputError
+from vermilion.multiview.anchors import anchor_window, choose_anchor, clip_frames_of, n_clips
 from vermilion.multiview.contact import Lips, resolve_contact
-from vermilion.multiview.track import choose_anchors
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.multiview.views import (
     load_frame,
@@ -114,10 +114,30 @@ def test_a_frame_with_one_camera_left_is_an_error_with_its_number():
         load_frame(Source(broken=("a", "b", "c")), RIG, 7, 8.0, 0.01)
 
 
-def test_anchors_are_the_frames_most_like_the_neutral_and_apart():
-    similarity = np.array([1.0, 0.9, 0.5, 0.4, 0.85, 0.88, 0.84, np.nan, 0.2, 0.81])
-    assert choose_anchors(similarity, 0.8, 3) == [0, 5, 9]
-    assert choose_anchors(similarity, 0.95, 3) == [0]
+def test_the_anchor_is_the_readable_frame_most_like_the_neutral():
+    similarity = np.array([0.5, np.nan, 0.85, 0.88, 0.84])
+    assert choose_anchor(similarity, 0.8) == 3
+    assert choose_anchor(similarity, 0.95) is None
+    assert choose_anchor(np.array([np.nan]), 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "size"), [(0, 46, 24), (5, 5, 24), (0, 24, 24), (3, 99, 6)]
+)
+def test_windows_of_anchors_lie_in_the_take_and_apart(first, last, size):
+    windows = [anchor_window(first, last, size, k) for k in range(1, n_clips(first, last, size))]
+    seen = [frame for window in windows for frame in window]
+    assert len(seen) == len(set(seen))
+    assert all(first < frame <= last for frame in seen)
+
+
+@pytest.mark.parametrize("anchors", [[8, 17, 22], [-1, 17, -1], [8, -1, -1], [-1, -1, -1]])
+def test_clips_cover_a_take_once_whichever_anchors_are_missing(anchors):
+    clips = [clip_frames_of(2, 30, anchors, index) for index in range(4)]
+    assert [frame for frames, _ in clips for frame in frames] == list(range(2, 31))
+    for frames, end in clips:
+        if end is not None:
+            assert anchors[end - 1] == frames[-1] + 1
 
 
 def plates(gap_mm):

@@ -25,7 +25,8 @@ AFTER_INPAINT = AFTER_TRACKING | {
 }  # fmt: skip
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
-    "landmarks_views", "multiview_neutral", "multiview_track", "multiview_refine",
+    "landmarks_views", "multiview_neutral", "multiview_anchor", "multiview_clip",
+    "multiview_track", "multiview_refine",
 }  # fmt: skip
 
 

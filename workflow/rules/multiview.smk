@@ -1,4 +1,48 @@
-"""H, the registered high-quality mesh sequence of a rig's take (Lips16 3.1, Beeler et al. 2011)."""
+"""H, the registered high-quality mesh sequence of a rig's take (Lips16 3.1, Beeler et al. 2011).
+
+The take is cut into clips of about `multiview.track.clip_frames`: anchors are jobs of their own, then
+clips between anchors, then chunks of frames; each kind runs side by side.
+"""
+
+from vermilion.multiview.anchors import anchor_window, n_clips
+
+
+wildcard_constraints:
+    clip=r"\d{4}",
+
+
+def clips_of(wildcards):
+    """Indices of the clips of the wildcards' take."""
+    row = take_of(wildcards)
+    return range(n_clips(row.first, row.last, CONFIG.multiview.track.clip_frames))
+
+
+def per_clip(pattern, first=0):
+    """Input function: `pattern` for every clip of the wildcards' take from `first` on."""
+    return lambda wildcards: [
+        pattern.format(subject=wildcards.subject, take=wildcards.take, clip=f"{clip:04d}")
+        for clip in clips_of(wildcards)[first:]
+    ]
+
+
+def window_of(wildcards):
+    """Frames among which an anchor is sought."""
+    row = take_of(wildcards)
+    size = CONFIG.multiview.track.clip_frames
+    return list(anchor_window(row.first, row.last, size, int(wildcards.clip)))
+
+
+def window_manifests(wildcards):
+    """Manifests of the chunks that hold an anchor's window, and the neutral's."""
+    wanted = {take_of(wildcards).first, *window_of(wildcards)}
+    pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
+    files = expand_chunks(pattern, wildcards.subject, wildcards.take)
+    names = chunks(wildcards.subject, wildcards.take)
+    return [path for path, name in zip(files, names) if wanted & set(frames_in(name))]
+
+
+ANCHORS = R + "/takes/{subject}/{take}/multiview/anchors/{clip}.npz"
+CLIPS = R + "/takes/{subject}/{take}/multiview/clips/{clip}.npz"
 
 
 rule multiview_neutral:
@@ -29,13 +73,65 @@ rule multiview_neutral:
         "../scripts/multiview_neutral.py"
 
 
-rule multiview_track:
-    """Tracks the neutral's mesh coarsely through the take, from anchor frames: track.npz."""
+rule multiview_anchor:
+    """Registers the frame of a window that looks most like the neutral to it: anchors/{clip}.npz."""
     input:
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
         neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        manifests=window_manifests,
+    output:
+        anchor=ANCHORS,
+    log:
+        R + "/logs/multiview_anchor/{subject}-{take}-{clip}.log",
+    benchmark:
+        R + "/benchmarks/multiview_anchor/{subject}-{take}-{clip}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("multiview.images", "multiview.track"),
+        code=code_of("multiview_anchor"),
+        source=source_of,
+        neutral=lambda wildcards: take_of(wildcards).first,
+        window=window_of,
+    script:
+        "../scripts/multiview_anchor.py"
+
+
+rule multiview_clip:
+    """Tracks the frames between two anchors coarsely, forward and backward: clips/{clip}.npz."""
+    input:
+        template=R + "/face/template.npz",
+        cameras=R + "/takes/{subject}/{take}/cameras",
+        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        anchors=per_clip(ANCHORS, first=1),
         manifests=per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+    output:
+        clip=CLIPS,
+    log:
+        R + "/logs/multiview_clip/{subject}-{take}-{clip}.log",
+    benchmark:
+        R + "/benchmarks/multiview_clip/{subject}-{take}-{clip}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of("multiview.images", "multiview.track"),
+        code=code_of("multiview_clip"),
+        source=source_of,
+        frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
+    script:
+        "../scripts/multiview_clip.py"
+
+
+rule multiview_track:
+    """Joins the clips of a take: track.npz."""
+    input:
+        template=R + "/face/template.npz",
+        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        anchors=per_clip(ANCHORS, first=1),
+        clips=per_clip(CLIPS),
     output:
         track=R + "/takes/{subject}/{take}/multiview/track.npz",
         topology=R + "/takes/{subject}/{take}/multiview/H/topology.ply",
@@ -44,13 +140,10 @@ rule multiview_track:
     benchmark:
         R + "/benchmarks/multiview_track/{subject}-{take}.tsv"
     resources:
-        mem_mb=1500,
-        runtime=240,
+        mem_mb=2000,
+        runtime=10,
     params:
-        cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview_track"),
-        source=source_of,
-        frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
     script:
         "../scripts/multiview_track.py"
 

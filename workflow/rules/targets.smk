@@ -40,6 +40,16 @@ def take_outputs():
     ]
 
 
+def clip_outputs():
+    """Anchors and clips of every take with H."""
+    return [
+        path
+        for take in used_takes("tattoo")
+        for pattern, first in ((ANCHORS, 1), (CLIPS, 0))
+        for path in per_clip(pattern, first)(take)
+    ]
+
+
 def subject_outputs():
     """Files of every subject of the database, and identities of all that are tracked."""
     tracked = dict.fromkeys(take.subject for take in used_takes(("tattoo", "video")))
@@ -68,6 +78,7 @@ def all_outputs():
         f"{R}/face/tracker.npz",
         *landmark_model,
         *take_outputs(),
+        *clip_outputs(),
         *subject_outputs(),
         R + "/database/lips.h5",
         *regressor_outputs(),

@@ -143,8 +143,11 @@ class TrackConfig(StageConfig):
         le=1,
         description="Smallest correlation of an anchor frame's pictures with the neutral's.",
     )
-    anchor_spacing: int = Field(
-        10, ge=1, le=10_000, description="Smallest distance of two anchor frames (frames)."
+    clip_frames: int = Field(
+        24,
+        ge=3,
+        le=10_000,
+        description="Frames of a clip between two anchor frames, about; each clip is a job (frames).",
     )
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from vermilion.arrays import read_arrays, write_arrays
 from vermilion.errors import InputError
 from vermilion.landmarks.views import LandmarkViews
+from vermilion.multiview.anchors import Anchor
 from vermilion.multiview.neutral import Neutral
-from vermilion.multiview.track import Track
+from vermilion.multiview.track import Clip, Track
 from vermilion.multiview.triangulate import SLIDING
 
 
@@ -62,6 +63,40 @@ def read_neutral(path: str | Path, n_vertices: int, **place) -> np.ndarray:
             **place,
         )
     return vertices
+
+
+def write_anchor(path: str | Path, anchor: Anchor) -> None:
+    """`.npz`: frame; vertices_mm (V, 3); window, similarity (W,)."""
+    _save(
+        path,
+        frame=np.array(anchor.frame),
+        vertices_mm=anchor.vertices_mm,
+        window=anchor.window,
+        similarity=anchor.similarity,
+    )
+
+
+def read_anchor(path: str | Path) -> Anchor:
+    """What `write_anchor` wrote."""
+    arrays = _load(path, ("frame", "vertices_mm", "window", "similarity"))
+    return Anchor(**{**arrays, "frame": int(arrays["frame"])})
+
+
+def write_clip(path: str | Path, clip: Clip) -> None:
+    """`.npz`: frames (F,); coarse_mm (F, V, 3) float32; reasons."""
+    _save(
+        path,
+        frames=clip.frames,
+        coarse_mm=clip.coarse_mm.astype(np.float32),
+        reasons=np.array(clip.reasons, dtype=str),
+    )
+
+
+def read_clip(path: str | Path) -> Clip:
+    """What `write_clip` wrote."""
+    arrays = _load(path, ("frames", "coarse_mm", "reasons"))
+    reasons = tuple(str(reason) for reason in arrays["reasons"])
+    return Clip(arrays["frames"], arrays["coarse_mm"], reasons)
 
 
 def write_track(path: str | Path, track: Track) -> None:

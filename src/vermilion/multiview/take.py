@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -71,6 +71,22 @@ class Pictures:
         if scale == 1.0:
             return frame
         return shrunk(frame, scale, self.settings.window_at(scale), self.settings.floor)
+
+
+#: Frames whose small pictures are kept in memory, about 3 MB each for ten cameras.
+KEPT_FRAMES = 100
+
+
+def open_coarse(
+    pictures: Pictures, number: int, vertices_mm: np.ndarray, triangles: np.ndarray, scale: float
+) -> tuple[Reference, Callable[[int], Frame]]:
+    """A frame whose mesh (V, 3) is known, at a smaller size, and a reader of frames of that size."""
+
+    @lru_cache(maxsize=KEPT_FRAMES)
+    def load(number: int) -> Frame:
+        return pictures.load(number, scale)
+
+    return Reference.of(load(number), vertices_mm, triangles), load
 
 
 @dataclass(frozen=True)

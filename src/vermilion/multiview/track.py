@@ -1,39 +1,37 @@
-"""A coarse track of the take: anchor frames, and clips between them (Beeler et al. 2011).
+"""A coarse track of the take, clip by clip, from anchor frame to anchor frame (Beeler et al. 2011).
 
-Anchors are frames that look like the neutral; they are registered to it directly, so that drift
-cannot build up past them. Each clip between two anchors is tracked from frame to frame, forward
-from its first anchor and backward from its last, and the two are blended.
+Each clip between two anchors is tracked from frame to frame, forward from its first anchor and
+backward from the one that ends it, and the two are blended.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
-import cv2
 import numpy as np
 
 from vermilion.errors import InputError
+from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
 from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.refine import register_frame
 from vermilion.multiview.views import Frame, pixel_jacobian, sample
-from vermilion.raycast import RayCaster
-
-LoadFrame = Callable[[int], Frame]
 
 
 @dataclass(frozen=True)
-class TrackSettings:
-    """See `vermilion.config.multiview` for meanings and units."""
+class Clip:
+    """Coarse positions of the frames from an anchor to the frame before the next.
 
-    length_mm: float
-    sigma_px: float
-    min_agreement: float
-    max_step_mm: float
-    anchor_similarity: float
-    anchor_spacing: int
+    Attributes:
+        frames: (F,) frame numbers; none where the clip has no anchor of its own.
+        coarse_mm: (F, V, 3).
+        reasons: (F,) empty, or why the frame could not be tracked (its position is that of a
+            neighbour).
+    """
+
+    frames: np.ndarray
+    coarse_mm: np.ndarray
+    reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -43,10 +41,10 @@ class Track:
     Attributes:
         frames: (F,) frame numbers.
         coarse_mm: (F, V, 3) float32.
-        similarity: (F,) correlation of each frame's pictures with the neutral's, NaN if unreadable.
+        similarity: (F,) correlation of the pictures with the neutral's; NaN where no anchor was
+            sought or the frame is unreadable.
         anchors: (F,) bool.
-        reasons: (F,) empty, or why the frame could not be tracked (its position is that of the
-            frame before).
+        reasons: (F,) empty, or why the frame could not be tracked.
     """
 
     frames: np.ndarray
@@ -56,92 +54,19 @@ class Track:
     reasons: tuple[str, ...]
 
 
-def track_take(
-    reference: Reference,
-    frames: Sequence[int],
-    load: LoadFrame,
-    matcher: FlowMatcher,
-    settings: TrackSettings,
-) -> Track:
-    """Track the reference's mesh through a take; the reference is `frames[0]`.
-
-    Args:
-        load: reads a frame at the reference's resolution; raises InputError if it cannot.
-    """
-    frames = list(frames)
-    similarity, reasons = _similarities(reference, frames, load)
-    anchors = choose_anchors(similarity, settings.anchor_similarity, settings.anchor_spacing)
-    coarse = np.zeros((len(frames), *reference.vertices_mm.shape), dtype=np.float32)
-    coarse[0] = reference.vertices_mm
-    for index in anchors[1:]:
-        coarse[index] = _anchor(reference, load(frames[index]), matcher, settings)
-    ends = [*anchors, len(frames)]
-    for first, last in pairwise(ends):
-        numbers = frames[first : last + 1]
-        end = coarse[last] if last < len(frames) else None
-        clip = track_clip(reference, numbers, load, coarse[first], end, matcher, settings)
-        coarse[first : first + len(clip)] = clip
-    flags = np.zeros(len(frames), dtype=bool)
-    flags[anchors] = True
-    return Track(np.array(frames), coarse, similarity, flags, tuple(reasons))
-
-
-def choose_anchors(similarity: np.ndarray, threshold: float, spacing: int) -> list[int]:
-    """Indices of frames most like the first, at least `spacing` apart, in order; with the first.
-
-    Args:
-        similarity: (F,) correlation with the first frame; NaN is never chosen.
-        threshold: smallest correlation of an anchor.
-    """
-    chosen = [0]
-    for index in np.argsort(-np.nan_to_num(similarity, nan=-1.0), kind="stable"):
-        value = similarity[index]
-        if not value >= threshold:
-            continue
-        if min(abs(index - other) for other in chosen) >= spacing:
-            chosen.append(int(index))
-    return sorted(chosen)
-
-
-def _similarities(reference: Reference, frames, load) -> tuple[np.ndarray, list[str]]:
-    caster = RayCaster(reference.vertices_mm, reference.triangles)
-    masks = {name: caster.see(view.camera).hit for name, view in reference.frame.views.items()}
-    similarity, reasons = np.full(len(frames), np.nan), [""] * len(frames)
-    for index, number in enumerate(frames):
-        try:
-            frame = load(number)
-        except InputError as error:
-            reasons[index] = str(error)
-            continue
-        names = [name for name in frame.views if name in masks]
-        values = [
-            _correlation(
-                reference.frame.views[name].normalised, frame.views[name].normalised, masks[name]
-            )
-            for name in names
-        ]
-        similarity[index] = np.mean(values) if values else np.nan
-    return similarity, reasons
-
-
-def _correlation(a: np.ndarray, b: np.ndarray, mask: np.ndarray, sigma_px: float = 2.0) -> float:
-    """Correlation of two blurred pictures inside a mask."""
-    x, y = (cv2.GaussianBlur(p.astype(np.float32), (0, 0), sigma_px)[mask] for p in (a, b))
-    x, y = x - x.mean(), y - y.mean()
-    return float((x @ y) / max(np.linalg.norm(x) * np.linalg.norm(y), 1e-9))
-
-
-def _anchor(reference, frame, matcher, settings) -> np.ndarray:
-    levels = [(reference, frame, 2 * settings.length_mm), (reference, frame, settings.length_mm)]
-    found = register_frame(
-        levels,
-        reference.vertices_mm,
-        matcher,
-        sigma_px=settings.sigma_px,
-        max_step_mm=settings.max_step_mm,
-        min_agreement=settings.min_agreement,
-    )
-    return found.vertices_mm
+def join_clips(clips: Sequence[Clip], anchors: Sequence[Anchor]) -> Track:
+    """The track of a take from all its clips, in order, and its anchors after the neutral."""
+    frames = np.concatenate([clip.frames for clip in clips]).astype(np.int64)
+    if not np.array_equal(frames, np.arange(frames[0], frames[0] + len(frames))):
+        raise ValueError("the clips do not follow one another")
+    similarity = np.full(len(frames), np.nan)
+    for anchor in anchors:
+        similarity[anchor.window - frames[0]] = anchor.similarity
+    similarity[0] = 1.0
+    marked = np.isin(frames, [frames[0], *(anchor.frame for anchor in anchors)])
+    coarse = np.concatenate([clip.coarse_mm for clip in clips if len(clip.frames)])
+    reasons = sum((clip.reasons for clip in clips), ())
+    return Track(frames, coarse.astype(np.float32), similarity, marked, reasons)
 
 
 def track_clip(
@@ -152,29 +77,40 @@ def track_clip(
     last_mm: np.ndarray | None,
     matcher: FlowMatcher,
     settings: TrackSettings,
-) -> np.ndarray:
-    """Positions (F, V, 3) of a clip whose first (and last) frame is known."""
-    forward = _sweep(reference, frames, load, first_mm, matcher, settings)
-    if last_mm is None or len(frames) < 3:
-        return forward
-    backward = _sweep(reference, frames[::-1], load, last_mm, matcher, settings)[::-1]
+) -> Clip:
+    """Track a clip whose first frame is known (V, 3).
+
+    Args:
+        frames: of the clip, and the anchor that ends it where `last_mm` is its position.
+        load: reads a frame at the reference's resolution; raises InputError if it cannot.
+    """
+    forward, reasons = _sweep(reference, frames, load, first_mm, matcher, settings)
+    if last_mm is None:
+        return Clip(np.array(frames), forward, reasons)
+    backward, _ = _sweep(reference, frames[::-1], load, last_mm, matcher, settings)
     share = np.linspace(0, 1, len(frames))[:, None, None]
-    return (1 - share) * forward + share * backward
+    blended = (1 - share) * forward + share * backward[::-1]
+    return Clip(np.array(frames[:-1]), blended[:-1], reasons[:-1])
 
 
-def _sweep(reference, frames, load, start_mm, matcher, settings) -> np.ndarray:
-    """Frame to frame from a known first; an unreadable frame keeps the position before it."""
-    positions = [np.asarray(start_mm, dtype=np.float64)]
+def _sweep(reference, frames, load, start_mm, matcher, settings):
+    """Frame to frame from a known first: (positions (F, V, 3), reasons (F,)).
+
+    An unreadable frame keeps the position before it.
+    """
+    positions, reasons = [np.asarray(start_mm, dtype=np.float64)], [""]
     before = load(frames[0])
     for number in frames[1:]:
         try:
             after = load(number)
-        except InputError:
+        except InputError as error:
             positions.append(positions[-1])
+            reasons.append(str(error))
             continue
         positions.append(follow(reference, before, after, positions[-1], matcher, settings))
+        reasons.append("")
         before = after
-    return np.array(positions)
+    return np.array(positions), tuple(reasons)
 
 
 def follow(
