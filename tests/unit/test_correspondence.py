@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from tests.unit.test_integration import sheet
 from vermilion.camera import look_at, pinhole
 from vermilion.correction.head import align_frames, head_from_world, world_from_head
+from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.correspondence.correspondence import (
     Correspondence,
     find_correspondence,
@@ -66,6 +67,23 @@ def test_a_surface_that_faces_away_or_is_the_other_lip_is_no_match():
         points, mesh, sides=np.full(len(points), -1), triangle_sides=sides
     )
     assert np.all(same_lip.triangle < len(triangles))
+
+
+def test_bound_triangles_never_face_against_their_surface():
+    vertices, triangles, _ = sheet(20)
+    surface = Mesh(vertices, triangles)
+    folded = vertices + np.array([0.0, 0, 0.2])
+    middle = np.argmin(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1))
+    spacing = np.sort(np.linalg.norm(vertices - vertices[middle], axis=1))[1]
+    folded[middle, :2] += [1.6 * spacing, 0.3 * spacing]  # past its neighbour
+    registered = Mesh(folded, triangles)
+    direct, _ = closest_on_surface(folded, surface)
+    assert flipped_triangles(direct, triangles, surface).any()
+    found, distance = bind_vertices(registered, surface, max_distance_mm=5.0, max_angle_deg=70.0)
+    assert found.bound.all() and not flipped_triangles(found, triangles, surface).any()
+    away = np.linalg.norm(vertices - vertices[middle], axis=1) > 4 * spacing
+    np.testing.assert_array_equal(found.triangle[away], direct.triangle[away])
+    assert distance.max() < 3 * spacing
 
 
 def test_a_bound_point_moves_with_its_mesh():

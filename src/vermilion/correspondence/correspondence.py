@@ -12,11 +12,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from vermilion.arrays import read_arrays, write_arrays
+from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.correspondence.lip_sides import lip_sides
 from vermilion.correspondence.registration import register, sides_of_triangles
 from vermilion.correspondence.surface_map import SurfaceMap, closest_on_surface
 from vermilion.errors import InputError
-from vermilion.mesh import Mesh, triangle_normals, vertex_normals
+from vermilion.mesh import Mesh, triangle_normals
 
 FORMAT_VERSION = 1
 
@@ -146,26 +147,22 @@ def find_correspondence(
     triangle_sides = (
         None if sides_accurate is None else sides_of_triangles(accurate, sides_accurate)
     )
-    bind = {"max_angle_deg": max_angle_deg, "triangle_sides": triangle_sides}
-    vertices, distance = closest_on_surface(
-        registered.vertices_mm,
-        accurate,
-        normals=vertex_normals(registered.vertices_mm, coarse.triangles),
-        sides=sides_coarse,
-        **bind,
+    search = {"max_angle_deg": max_angle_deg, "triangle_sides": triangle_sides}
+    vertices, distance = bind_vertices(
+        registered, accurate, max_distance_mm=max_distance_mm, sides=sides_coarse, **search
     )
-    vertices = SurfaceMap(
-        np.where(distance <= max_distance_mm, vertices.triangle, -1), vertices.barycentric
-    )
-    triangles, triangle_distance = closest_on_surface(
-        registered.vertices_mm[coarse.triangles].mean(axis=1),
+    bound_mm = vertices.sample(accurate.vertices_mm, accurate.triangles)
+    whole = vertices.bound[coarse.triangles].all(axis=1)
+    bound = Mesh(np.nan_to_num(bound_mm), coarse.triangles)
+    triangles, _ = closest_on_surface(
+        bound.vertices_mm[coarse.triangles].mean(axis=1),
         accurate,
-        normals=triangle_normals(registered.vertices_mm, coarse.triangles),
+        normals=triangle_normals(bound.vertices_mm, coarse.triangles),
         sides=None if sides_coarse is None else sides_of_triangles(coarse, sides_coarse),
-        **bind,
+        **search,
     )
-    matched = vertices.bound[coarse.triangles].all(axis=1) & ~flipped_triangles(
-        registered, vertices.sample(accurate.vertices_mm, accurate.triangles)
+    matched = (
+        whole & (triangles.triangle >= 0) & ~flipped_triangles(vertices, coarse.triangles, accurate)
     )
     mask = mouth_mask(coarse, mouth_centre_mm, mask_radius_mm, matched, coarse_regions)
     in_mask = np.zeros(len(distance), dtype=bool)
@@ -175,8 +172,8 @@ def find_correspondence(
         rest = rest & coarse_regions["rigid"]
     correspondence = Correspondence(
         vertices=vertices,
-        triangles=np.where(triangle_distance <= max_distance_mm, triangles.triangle, -1),
-        distance_mm=np.where(vertices.bound, distance, np.inf),
+        triangles=np.where(whole, triangles.triangle, -1),
+        distance_mm=distance,
         mask=mask,
         rigid=rest,
         accurate_triangles=accurate.triangles,
@@ -184,13 +181,6 @@ def find_correspondence(
         coarse_neutral_mm=coarse.vertices_mm,
     )
     return correspondence, registered
-
-
-def flipped_triangles(registered: Mesh, bound_mm: np.ndarray) -> np.ndarray:
-    """Triangles that face the other way once their corners are bound (V, 3), (T,) bool."""
-    before = triangle_normals(registered.vertices_mm, registered.triangles)
-    after = triangle_normals(np.nan_to_num(bound_mm), registered.triangles)
-    return (before * after).sum(axis=1) <= 0
 
 
 def mouth_mask(

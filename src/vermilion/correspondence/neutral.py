@@ -8,13 +8,10 @@ import numpy as np
 
 from vermilion.camera import Camera
 from vermilion.correction.head import head_from_world
-from vermilion.correspondence.correspondence import (
-    Correspondence,
-    find_correspondence,
-    flipped_triangles,
-)
+from vermilion.correspondence.binding import flipped_triangles
+from vermilion.correspondence.correspondence import Correspondence, find_correspondence
 from vermilion.correspondence.landmarks import LIPS, back_project, inner_features
-from vermilion.correspondence.surface_map import SurfaceMap, at_vertices
+from vermilion.correspondence.surface_map import SurfaceMap, at_vertices, closest_barycentric
 from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
 from vermilion.landmarks.detector import LandmarkTrack
@@ -154,16 +151,17 @@ def correspond_neutrals(
 def quality_of(found: Correspondence, registered: Mesh, accurate: Mesh, frame: int) -> QualityRow:
     """Coverage, distances and folds of the mask; a row with a reason where they look wrong."""
     corners = found.coarse_triangles[found.mask]
-    vertices = np.unique(corners)
-    distance = found.distance_mm[vertices].astype(np.float64)
-    flipped = flipped_triangles(registered, found.on_coarse(accurate.vertices_mm))
+    distance = found.distance_mm[np.unique(corners)].astype(np.float64)
+    flipped = flipped_triangles(found.vertices, found.coarse_triangles, accurate)
+    centres = triangle_distances(found, registered, accurate)[found.mask]
     bound = found.vertices.bound
     figures = {
         "mask_triangles": len(found.mask),
         "bound_share": float(bound.mean()),
         "distance_mean_mm": float(distance.mean()),
         "distance_p95_mm": float(np.percentile(distance, 95)),
-        "flipped_triangles": int(flipped[bound[found.coarse_triangles].all(axis=1)].sum()),
+        "triangle_distance_mean_mm": float(centres.mean()),
+        "flipped_triangles": int(flipped.sum()),
     }
     reasons = []
     if figures["bound_share"] < 0.6:
@@ -171,3 +169,12 @@ def quality_of(found: Correspondence, registered: Mesh, accurate: Mesh, frame: i
     if figures["distance_p95_mm"] > 2.0:
         reasons.append(f"95 % of distances reach {figures['distance_p95_mm']:.1f} mm")
     return QualityRow(frame, not reasons, "; ".join(reasons), figures)
+
+
+def triangle_distances(found: Correspondence, registered: Mesh, accurate: Mesh) -> np.ndarray:
+    """From the centre of each registered C triangle to its triangle of H, (T,) mm, NaN without one."""
+    mapped = found.triangles >= 0
+    centres = registered.vertices_mm[registered.triangles].mean(axis=1)
+    corners = accurate.vertices_mm[accurate.triangles[np.maximum(found.triangles, 0)]]
+    nearest = (closest_barycentric(centres, corners)[..., None] * corners).sum(axis=1)
+    return np.where(mapped, np.linalg.norm(nearest - centres, axis=1), np.nan)
