@@ -107,7 +107,8 @@ def render(
 ) -> np.ndarray:
     """Linear picture (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
     over = 4
-    x, y = np.meshgrid(np.arange(240 * over) + 0.5, np.arange(180 * over) + 0.5)
+    size = (camera.width_px, camera.height_px)
+    x, y = np.meshgrid(*(np.arange(n * over) + 0.5 for n in size))
     caster = RayCaster(vertices, model.triangles)
     hits = caster.cast(*camera.rays(np.stack([x, y], axis=-1) / over))
     uv = interpolate(hits, model.triangles, model.uv.astype(float))
@@ -116,4 +117,4 @@ def render(
     shade = 0.25 + 0.75 * np.clip(interpolate(hits, model.triangles, normals) @ LIGHT, 0, 1)
     colour = sample(albedo(tattoo), texel) * (shade * light)[..., None]
     colour = np.where(hits.hit[..., None], colour, 0.004)
-    return cv2.resize(colour.astype(np.float32), (240, 180), interpolation=cv2.INTER_AREA)
+    return cv2.resize(colour.astype(np.float32), size, interpolation=cv2.INTER_AREA)

@@ -32,18 +32,24 @@ SETTINGS = MultiviewConfig(
 CFG = {f"multiview.{key}": value for key, value in SETTINGS.model_dump(mode="json").items()}
 
 
-@pytest.fixture(scope="module")
-def take(tmp_path_factory):
-    """A take of four frames, and the files that the stage reads; the template is of another face."""
-    root = tmp_path_factory.mktemp("multiview")
-    person, rig = lip_patch.face_model(), lip_patch.cameras()
+def make_capture(root, rig, lost=(), save=None):
+    """Pictures, cameras, landmarks and a template that is of another face, of four frames.
+
+    `save(picture, camera, folder, stem)` writes a picture; PNG by default.
+    """
+    person = lip_patch.face_model()
     write_cameras(root / "cameras", rig)
     for frame, pose in enumerate(POSES):
         vertices = lip_patch.vertices_at(*pose)
         for name, camera in rig.items():
-            if (frame, name) not in LOST:
-                picture = lip_patch.render(person, vertices, camera, tattoo=True)
-                write_image(root / f"rom/frames/{name}/{frame:06d}.png", picture)
+            if (frame, name) in lost:
+                continue
+            picture = lip_patch.render(person, vertices, camera, tattoo=True)
+            folder, stem = root / f"rom/frames/{name}", f"{frame:06d}"
+            if save is None:
+                write_image(folder / f"{stem}.png", picture)
+            else:
+                save(picture, name, folder, stem)
     rows = np.repeat([lip_patch.LIP_ROWS, 19, 26], 22)
     columns = np.tile(np.linspace(0, lip_patch.COLUMNS, 22, endpoint=False).astype(int), 3)
     landmarks = (rows * lip_patch.COLUMNS + columns).astype(np.int32)
@@ -55,9 +61,21 @@ def take(tmp_path_factory):
     np.savez(
         root / "views.npz", cameras=np.array(list(rig)), points_px=points, confidence=confidence
     )
+
+
+def reconstruct(root):
+    """All jobs of the stage, with one clip and one chunk."""
     neutral(root)
     track(root)
     refine(root, [0, 1, 2, 3], "000000-000003")
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """A reconstructed take of four frames."""
+    root = tmp_path_factory.mktemp("multiview")
+    make_capture(root, lip_patch.cameras(), LOST)
+    reconstruct(root)
     return root
 
 
