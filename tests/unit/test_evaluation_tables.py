@@ -11,10 +11,9 @@ from vermilion.evaluation.corrected import measure_name
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.figures import map_frames
 from vermilion.evaluation.files import load_sums, save_sums
-from vermilion.evaluation.page import number, page, table
 from vermilion.evaluation.pooled import pooled_rows
-from vermilion.evaluation.summary import spans
 from vermilion.evaluation.table1 import in_order, kind_of, table1
+from vermilion.page import number, page, spans, table
 
 
 def take(base, regressor, name):

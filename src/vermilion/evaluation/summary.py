@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vermilion.evaluation import page
+from vermilion import page
 from vermilion.evaluation.table1 import in_order
 
 FRAME_COLUMNS = ("take", "role", "frames", "held_out", "against")
@@ -161,7 +161,7 @@ def _flagged(found: Findings) -> str:
     rows = found.flagged.assign(where=found.flagged["subject"] + "/" + found.flagged["take"])
     counts = (
         rows.groupby(["stage", "where", "reason"], sort=False)["frame"]
-        .agg(["count", lambda frames: spans(frames.tolist())])
+        .agg(["count", lambda frames: page.spans(frames.tolist())])
         .set_axis(["count", "which"], axis=1)
         .reset_index()
     )
@@ -169,17 +169,6 @@ def _flagged(found: Findings) -> str:
         "stage": "stage", "where": "take", "count": "frames", "which": "which", "reason": "reason"
     }  # fmt: skip
     return page.table(counts, headings, "stage")
-
-
-def spans(frames: Sequence[int]) -> str:
-    """`3-5, 9` of frame numbers."""
-    parts: list[list[int]] = []
-    for frame in sorted({int(f) for f in frames}):
-        if parts and frame == parts[-1][1] + 1:
-            parts[-1][1] = frame
-        else:
-            parts.append([frame, frame])
-    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
 
 
 def _stages(overlays: Sequence[Overlay]) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pandas as pd
 
 _LARGE_BYTES = 300_000
@@ -76,6 +77,17 @@ def number(value: object, digits: int = 2) -> str:
     return text(value)
 
 
+def spans(frames: Sequence[int]) -> str:
+    """`3-5, 9` of frame numbers."""
+    parts: list[list[int]] = []
+    for frame in sorted({int(f) for f in frames}):
+        if parts and frame == parts[-1][1] + 1:
+            parts[-1][1] = frame
+        else:
+            parts.append([frame, frame])
+    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
+
+
 def table(rows: pd.DataFrame, headings: dict[str, str], group: str | None = None) -> str:
     """Columns of a table under other headings; a line above each new value of column `group`."""
     numeric = {c for c in headings if pd.api.types.is_numeric_dtype(rows[c])}
@@ -107,14 +119,24 @@ def figures(items: Sequence[tuple[str, str]]) -> str:
 def picture(path: str | Path, caption: str, width_px: int = 1400) -> str:
     """A PNG or JPEG, embedded; large ones as JPEG of at most `width_px`."""
     path = Path(path)
-    kind, content = "png", path.read_bytes()
-    if len(content) > _LARGE_BYTES:
-        pixels = cv2.imread(str(path))
-        if pixels.shape[1] > width_px:
-            height = round(pixels.shape[0] * width_px / pixels.shape[1])
-            pixels = cv2.resize(pixels, (width_px, height), interpolation=cv2.INTER_AREA)
-        kind = "jpeg"
-        content = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 84])[1].tobytes()
+    content = path.read_bytes()
+    if len(content) <= _LARGE_BYTES:
+        return embedded(content, "png", caption)
+    pixels = cv2.imread(str(path))
+    if pixels.shape[1] > width_px:
+        height = round(pixels.shape[0] * width_px / pixels.shape[1])
+        pixels = cv2.resize(pixels, (width_px, height), interpolation=cv2.INTER_AREA)
+    return embedded(jpeg(pixels[..., ::-1], 84), "jpeg", caption)
+
+
+def jpeg(pixels: np.ndarray, quality: int) -> bytes:
+    """(h, w, 3) uint8 RGB as a JPEG file of a quality of 0 to 100."""
+    pixels = np.ascontiguousarray(pixels[..., ::-1])
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+
+
+def embedded(content: bytes, kind: str, caption: str) -> str:
+    """The bytes of a picture file (`kind` png or jpeg) as a figure."""
     encoded = base64.b64encode(content).decode("ascii")
     return (
         f'<figure><img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'
