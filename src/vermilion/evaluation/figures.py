@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
-import matplotlib
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from vermilion.camera import Camera, look_at, pinhole
 from vermilion.draw import colour_map
 from vermilion.evaluation.table1 import in_order, kind_of
 from vermilion.export.shading import shade
-from vermilion.files import atomic_path
+from vermilion.plot import new_figure, plain, save, with_gaps
 
 COLOURS = {
     "base": "#8c8c8c", "oracle": "#2b2b2b", "contour": "#b08d57", "PS": "#c8553d",
@@ -122,7 +119,7 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
         table: columns frame, regressor, vermilion_mm, mouth_mm, aperture_mm; the rows of regressor
             `truth` have the true aperture alone.
     """
-    figure = _figure(8.6, 6.6)
+    figure = new_figure(8.6, 6.6)
     axes = figure.subplots(3, 1, sharex=True)
     panels = (
         ("mouth_mm", "mouth, mm"),
@@ -133,17 +130,17 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
         for regressor in in_order(r for r in table["regressor"] if r != "truth"):
             rows = table[table["regressor"] == regressor]
             axis.plot(
-                *_with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
+                *with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
                 line_of(regressor), color=colour_of(regressor), lw=1.4, label=regressor,
             )  # fmt: skip
         if column == "aperture_mm":
             rows = table[table["regressor"] == "truth"]
             axis.plot(
-                *_with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
+                *with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
                 ":", color=_INK, lw=1.4, label="truth",
             )  # fmt: skip
         axis.set_ylabel(text)
-        _plain(axis)
+        plain(axis)
         axis.set_ylim(bottom=0)
     axes[0].set_title(title, loc="left", fontsize=10)
     axes[-1].set_xlabel("frame")
@@ -155,7 +152,7 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
 def bars(table: pd.DataFrame, out: str | Path) -> None:
     """Table 1 as a picture: mean error of each regressor with its interval, a group a take."""
     groups = list(table.groupby(["subject", "take"], sort=False))
-    figure = _figure(8.6, 0.9 + 0.26 * (len(table) + 1.5 * len(groups)))
+    figure = new_figure(8.6, 0.9 + 0.26 * (len(table) + 1.5 * len(groups)))
     axis = figure.subplots()
     places, names, y = [], [], 0.0
     for (subject, take), rows in groups:
@@ -178,31 +175,6 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
     axis.invert_yaxis()
     axis.set_xlim(0, 1.5 * np.nanmax([1e-3, *table["mean_mm"], *table["high_mm"]]))
     axis.set_xlabel("mean vertex error over the mouth mask, mm (line: interval over clips)")
-    _plain(axis)
+    plain(axis)
     axis.grid(False)
     save(figure, out)
-
-
-def save(figure: Figure, out: str | Path) -> None:
-    """Write a PNG whose bytes depend on the figure alone."""
-    with atomic_path(out) as temporary:
-        figure.savefig(temporary, dpi=120, format="png", metadata={"Software": None})
-
-
-def _figure(width_in: float, height_in: float) -> Figure:
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
-    FigureCanvasAgg(figure)
-    matplotlib.rcParams["font.size"] = 8.5
-    return figure
-
-
-def _plain(axis) -> None:
-    axis.spines[["top", "right"]].set_visible(False)
-    axis.grid(axis="y", color="#e6e6e6", lw=0.7)
-    axis.set_axisbelow(True)
-
-
-def _with_gaps(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Insert a NaN where frame numbers jump, so that no line is drawn across."""
-    jumps = np.flatnonzero(np.diff(frames) > 1) + 1
-    return np.insert(frames.astype(float), jumps, np.nan), np.insert(values, jumps, np.nan)

@@ -186,6 +186,63 @@ class FlowMatcher:
         return cv2.blur(picture, (self.window_px, self.window_px))
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """A picture predicted through the mesh against the real one, in a window.
+
+    Attributes:
+        raster: of the window.
+        predicted, real: (h, w) uint8, locally normalised; `predicted` is `real` outside the mask.
+        mask: (h, w) bool, where there is a prediction.
+        flow: (h, w, 2) from the predicted to the real picture, px.
+        agreement: (h, w) local correlation after the flow.
+    """
+
+    raster: Raster
+    predicted: np.ndarray
+    real: np.ndarray
+    mask: np.ndarray
+    flow: np.ndarray
+    agreement: np.ndarray
+
+
+def compare(
+    matcher: FlowMatcher, raster: Raster, view: View, reference: View, reference_sight: Sight
+) -> Comparison:
+    """Carry the picture of `reference` through the mesh to `view`, and find what moved there.
+
+    Args:
+        raster: of the mesh as it is thought to stand in the view.
+        reference, reference_sight: another picture of the same surface (another frame or camera).
+    """
+    where, mask = warp_to(raster, reference_sight.pixels, reference_sight.visible)
+    real = raster.cut(view.normalised)
+    predicted = cv2.remap(
+        reference.normalised,
+        where[..., 0] - 0.5,
+        where[..., 1] - 0.5,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    predicted = np.where(mask, predicted, real)
+    flow = matcher.flow(predicted, real)
+    agreement = matcher.agreement(predicted, real, flow, mask)
+    return Comparison(raster, predicted, real, mask, flow, agreement)
+
+
+def motion_at(
+    found: Comparison, seen: Sight, reference_sight: Sight, min_agreement: float = 0.4
+) -> Motion:
+    """The flow of a comparison at the vertices that both pictures see."""
+    inside = seen.pixels - [found.raster.left_px, found.raster.top_px]
+    stack = np.dstack([found.flow, found.agreement, found.mask.astype(np.float32)])
+    at = sample(stack, inside)
+    usable = seen.visible & reference_sight.visible & (at[:, 3] > 0.9)
+    weight = np.clip((at[:, 2] - min_agreement) / (1 - min_agreement), 0, 1)
+    weight = weight * np.clip(seen.cosine, 0, 1)
+    return Motion(at[:, :2].astype(np.float64), np.where(usable, weight, 0.0))
+
+
 def measure_motion(
     matcher: FlowMatcher,
     raster: Raster | None,
@@ -205,21 +262,5 @@ def measure_motion(
     """
     if raster is None:
         return Motion(np.zeros_like(seen.pixels), np.zeros(len(seen.pixels)))
-    where, mask = warp_to(raster, reference_sight.pixels, reference_sight.visible)
-    real = raster.cut(view.normalised)
-    predicted = cv2.remap(
-        reference.normalised,
-        where[..., 0] - 0.5,
-        where[..., 1] - 0.5,
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    predicted = np.where(mask, predicted, real)
-    flow = matcher.flow(predicted, real)
-    agreement = matcher.agreement(predicted, real, flow, mask)
-    inside = seen.pixels - [raster.left_px, raster.top_px]
-    at = sample(np.dstack([flow, agreement, mask.astype(np.float32)]), inside)
-    usable = seen.visible & reference_sight.visible & (at[:, 3] > 0.9)
-    weight = np.clip((at[:, 2] - min_agreement) / (1 - min_agreement), 0, 1)
-    weight = weight * np.clip(seen.cosine, 0, 1)
-    return Motion(at[:, :2].astype(np.float64), np.where(usable, weight, 0.0))
+    found = compare(matcher, raster, view, reference, reference_sight)
+    return motion_at(found, seen, reference_sight, min_agreement)

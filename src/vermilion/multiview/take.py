@@ -106,6 +106,32 @@ class RefinedFrame:
     quality: QualityRow
 
 
+def skin_of(model: FaceModel) -> np.ndarray:
+    """Vertices (V,) that stereo points may pull: not the inside of the mouth, not the eyes."""
+    return ~(model.regions["mouth_inner"] | model.regions["eyes"])
+
+
+def frame_cloud(
+    pictures: Pictures,
+    frame: Frame,
+    vertices_mm: np.ndarray,
+    model: FaceModel,
+    stereo: StereoSettings,
+    settings: RefineSettings,
+) -> Cloud:
+    """Stereo points of a frame near a mesh; none if switched off or no pair is left."""
+    scale = settings.cloud_scale
+    if not scale:
+        return Cloud.join([])
+    stereo = replace(stereo, speckle_px=round(stereo.speckle_px * scale**2))
+    try:
+        raw = stereo_cloud(pictures.at(frame, scale), vertices_mm.mean(axis=0), stereo)
+    except InputError:  # the cameras left make no stereo pair
+        return Cloud.join([])
+    mesh = Mesh(np.asarray(vertices_mm, dtype=np.float64), model.triangles)
+    return near_mesh(raw, mesh, 2 * settings.cloud_gate_mm, skin_of(model))
+
+
 class Refiner:
     """Registers any frame of a take to its neutral; frames do not depend on each other."""
 
@@ -129,17 +155,11 @@ class Refiner:
             )
             for scale in set(settings.scales)
         }
-        area = settings.cloud_scale**2
-        self.stereo = replace(stereo, speckle_px=round(stereo.speckle_px * area))
+        self.stereo = stereo
 
     @cached_property
     def lips(self) -> Lips:
         return lips_of(self.model)
-
-    @cached_property
-    def skin(self) -> np.ndarray:
-        """Vertices (V,) that stereo points may pull: not the inside of the mouth, not the eyes."""
-        return ~(self.model.regions["mouth_inner"] | self.model.regions["eyes"])
 
     @cached_property
     def seen_at_neutral(self) -> np.ndarray:
@@ -175,7 +195,7 @@ class Refiner:
             min_agreement=self.settings.min_agreement,
             stride_px=self.settings.ray_stride_px,
             cloud=cloud,
-            cloud_allowed=self.skin,
+            cloud_allowed=skin_of(self.model),
             cloud_gate_mm=self.settings.cloud_gate_mm,
         )
         if not np.isfinite(registered.vertices_mm).all():
@@ -196,16 +216,9 @@ class Refiner:
         return RefinedFrame(registered, contact, cloud, quality)
 
     def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:
-        """Stereo points near the coarse mesh; none if switched off or no pair is left."""
-        if not self.settings.cloud_scale:
-            return Cloud.join([])
-        small = self.pictures.at(frame, self.settings.cloud_scale)
-        try:
-            raw = stereo_cloud(small, vertices_mm.mean(axis=0), self.stereo)
-        except InputError:  # the cameras left make no stereo pair
-            return Cloud.join([])
-        mesh = Mesh(np.asarray(vertices_mm, dtype=np.float64), self.model.triangles)
-        return near_mesh(raw, mesh, 2 * self.settings.cloud_gate_mm, self.skin)
+        return frame_cloud(
+            self.pictures, frame, vertices_mm, self.model, self.stereo, self.settings
+        )
 
     def _quality(self, number, frame, registered, contact, cloud) -> QualityRow:
         measured = self.seen_at_neutral & np.isfinite(registered.residual_px)
@@ -237,7 +250,7 @@ class Refiner:
             registered.vertices_mm,
             normals,
             cloud,
-            self.skin,
+            skin_of(self.model),
             sigma_mm=1.0,
             gate_mm=self.settings.cloud_gate_mm,
         )

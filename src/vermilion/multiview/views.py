@@ -14,6 +14,8 @@ from vermilion.frames import FrameSource
 from vermilion.images import linear_to_srgb
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+#: Grey levels of one local deviation in a normalised picture.
+DEVIATION = 40
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
         cv2.blur(cv2.blur(values, (width, width)), (width, width)) for values in (grey, grey * grey)
     )
     deviation = np.sqrt(np.maximum(square - mean * mean, 0)) + floor
-    return np.clip(128 + 40 * (grey - mean) / deviation, 0, 255).astype(np.uint8)
+    return np.clip(128 + DEVIATION * (grey - mean) / deviation, 0, 255).astype(np.uint8)
 
 
 def undistorted(camera: Camera, image: np.ndarray) -> tuple[Camera, np.ndarray]:
