@@ -9,6 +9,7 @@ from vermilion.camera import look_at, pinhole
 from vermilion.errors import InputError
 from vermilion.multiview.anchors import anchor_window, choose_anchor, clip_frames_of, n_clips
 from vermilion.multiview.contact import Lips, resolve_contact
+from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.multiview.views import (
     load_frame,
@@ -138,6 +139,12 @@ def test_clips_cover_a_take_once_whichever_anchors_are_missing(anchors):
     for frames, end in clips:
         if end is not None:
             assert anchors[end - 1] == frames[-1] + 1
+
+
+def test_flow_that_does_not_lead_back_is_measured_in_pixels():
+    there = np.full((20, 30, 2), [3.0, 4.0], np.float32)
+    assert FlowMatcher().round_trip(there, -there).max() < 1e-5
+    assert FlowMatcher().round_trip(there, 0 * there) == pytest.approx(5.0)
 
 
 def plates(gap_mm):

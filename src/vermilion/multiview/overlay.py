@@ -47,16 +47,28 @@ def show_cloud(camera: Camera, cloud: Cloud) -> np.ndarray:
     towards = camera.centre_mm - cloud.points_mm
     depth = np.linalg.norm(towards, axis=1)
     shade = np.abs((cloud.normals * towards).sum(axis=1)) / depth
-    pixels = camera.project(cloud.points_mm)
+    value = np.rint(255 * (0.2 + 0.8 * shade)).astype(np.uint8)
+    return draw_dots(picture, camera, cloud.points_mm, np.repeat(value[:, None], 3, axis=1))
+
+
+def draw_dots(
+    picture: np.ndarray, camera: Camera, points_mm: np.ndarray, colours: np.ndarray
+) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with points (N, 3) as dots of 2 x 2 pixels, the nearest on top.
+
+    `colours` (N, 3) uint8.
+    """
+    picture = picture.copy()
+    depth = np.linalg.norm(camera.centre_mm - points_mm, axis=1)
+    pixels = camera.project(points_mm)
     inside = camera.in_image(pixels, 1.0)
     order = np.argsort(-depth[inside], kind="stable")
     column, row = np.floor(pixels[inside][order]).astype(int).T
-    value = np.rint(255 * (0.2 + 0.8 * shade[inside][order])).astype(np.uint8)
     for down in (0, 1):
         for right in (0, 1):
             y = np.minimum(row + down, camera.height_px - 1)
             x = np.minimum(column + right, camera.width_px - 1)
-            picture[y, x] = value[:, None]
+            picture[y, x] = colours[inside][order]
     return picture
 
 

@@ -182,6 +182,22 @@ class FlowMatcher:
         variance = np.sqrt(np.maximum(aa - ma**2, 0) * np.maximum(bb - mb**2, 0)) + 25.0
         return np.where(mask, (ab - ma * mb) / variance, 0.0).astype(np.float32)
 
+    def round_trip(self, flow: np.ndarray, back: np.ndarray) -> np.ndarray:
+        """Distance (h, w) px by which flow there and flow back (h, w, 2) miss the start.
+
+        What one picture hides has no way back.
+        """
+        height, width = flow.shape[:2]
+        x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+        returned = cv2.remap(
+            back,
+            x + flow[..., 0],
+            y + flow[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        return np.linalg.norm(flow + returned, axis=2)
+
     def _blur(self, picture):
         return cv2.blur(picture, (self.window_px, self.window_px))
 

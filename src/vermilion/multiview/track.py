@@ -121,7 +121,10 @@ def follow(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> np.ndarray:
-    """Carry a mesh from one frame to the next by the flow between their pictures, (V, 3) mm."""
+    """Carry a mesh from one frame to the next by the flow between their pictures, (V, 3) mm.
+
+    Flow that does not lead back to where it began, and flow between unlike places, weighs less.
+    """
     sights = see_all(before, vertices_mm, reference.triangles)
     jacobians, offsets, weights = [], [], []
     for name, view in before.views.items():
@@ -131,8 +134,10 @@ def follow(
         flow = matcher.flow(view.normalised, there.normalised)
         whole = np.ones(flow.shape[:2], dtype=bool)
         agreement = matcher.agreement(view.normalised, there.normalised, flow, whole)
-        at = sample(np.dstack([flow, agreement]), seen.pixels)
+        missed = matcher.round_trip(flow, matcher.flow(there.normalised, view.normalised))
+        at = sample(np.dstack([flow, agreement, missed]), seen.pixels)
         weight = np.clip((at[:, 2] - settings.min_agreement) / (1 - settings.min_agreement), 0, 1)
+        weight = weight / (1 + (at[:, 3] / (2 * settings.sigma_px)) ** 2)
         weights.append(np.where(seen.visible, weight * np.clip(seen.cosine, 0, 1), 0.0))
         offsets.append(at[:, :2].astype(np.float64))
         jacobians.append(pixel_jacobian(view.camera, vertices_mm))

@@ -133,7 +133,9 @@ def load_frame(
             continue
         views[name] = make_view(camera, linear, window_px, floor, scale)
     if len(views) < 2:
-        reasons = "; ".join(missing.values())
+        reasons = "; ".join(list(missing.values())[:2])
+        if len(missing) > 2:
+            reasons += f"; and {len(missing) - 2} more"
         raise InputError(
             f"{len(views)} readable pictures ({reasons})",
             "two or more cameras",
