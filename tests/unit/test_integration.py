@@ -5,6 +5,7 @@ import pytest
 
 from vermilion.correction.integration import LayerIntegrator, edge_stiffness
 from vermilion.correction.layers import correction_layers, decode_layers
+from vermilion.correction.right_side import TURN_SERIES, turn_limits
 
 
 def sheet(n=36, size_mm=180.0):
@@ -78,23 +79,23 @@ def test_the_seam_spreads_the_step_at_the_border(scene):
     assert creases[1] < 0.95 * creases[0]
 
 
-def test_blocks_of_frames_change_nothing(scene):
+def test_frames_in_one_block_know_nothing_of_each_other(scene):
     neutral, triangles, mask, coarse, accurate = scene
-    layers = correction_layers(coarse, accurate, triangles[mask]).astype(np.float32)
+    layers = correction_layers(coarse, accurate, triangles[mask])
+    coarse, layers = np.tile(coarse, (4, 1, 1)), np.tile(layers, (4, 1, 1))  # 20 frames, 2 blocks
     integrator = LayerIntegrator(neutral, triangles, mask)
-    np.testing.assert_allclose(
-        integrator.integrate(coarse, layers, block=1),
-        integrator.integrate(coarse, layers, block=4),
-        atol=1e-9,
-    )
+    alone = [integrator.integrate(coarse[f : f + 1], layers[f : f + 1])[0] for f in range(20)]
+    np.testing.assert_allclose(integrator.integrate(coarse, layers), alone, atol=1e-9)
 
 
-def test_right_side_agrees_with_a_plain_loop(scene):
-    """The series in the kernel against the exponential of `decode_layers`."""
+@pytest.mark.parametrize("turn", [0.3, 2.0])
+def test_right_side_agrees_with_a_plain_loop(scene, turn):
+    """The system that the result solves, its polynomials against the exponential of a layer."""
     neutral, triangles, mask, coarse, _ = scene
     layers = np.random.default_rng(6).normal(scale=0.7, size=(1, len(mask), 9))
-    integrator = LayerIntegrator(neutral, triangles, mask)
-    fast = integrator.right_side(coarse[:1], np.transpose(layers, (1, 2, 0)))[..., 0]
+    layers[..., :3] *= turn / np.linalg.norm(layers[..., :3], axis=-1, keepdims=True)
+    integrator = LayerIntegrator(neutral, triangles, mask, seam_mm=0.0)
+    moved = (integrator.integrate(coarse[:1], layers) - coarse[:1])[0]
     slow = np.zeros_like(neutral)
     change = decode_layers(layers[0]) - np.eye(3)
     for t, (corners, weights) in enumerate(zip(triangles[mask], integrator.weights, strict=True)):
@@ -103,7 +104,33 @@ def test_right_side_agrees_with_a_plain_loop(scene):
             flow = weights[k] * change[t] @ (coarse[0, j] - coarse[0, i])
             slow[j] += flow
             slow[i] -= flow
+    fast = integrator.matrix @ moved[integrator.free]
     np.testing.assert_allclose(fast, slow[integrator.free], atol=1e-9)
+
+
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_polynomials_of_the_turn_are_good_to_rounding_up_to_a_whole_turn(precision):
+    series, (factor, offset) = TURN_SERIES[np.dtype(precision)], turn_limits(precision)
+    angle = np.linspace(0, 2 * np.pi, 2001)
+    s = (angle**2 * factor - offset).astype(precision)
+    truth = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    for coefficients, values in zip(series, truth, strict=True):
+        np.testing.assert_allclose(
+            np.polyval(coefficients, s), values, atol=8 * np.finfo(precision).eps
+        )
+
+
+def test_mixed_layers_in_single_precision_are_as_good_as_given_ones(scene):
+    neutral, triangles, mask, coarse, accurate = scene
+    basis = correction_layers(coarse, accurate, triangles[mask]).reshape(5, -1).T
+    basis = np.ascontiguousarray(basis, dtype=np.float32)
+    mixture = np.random.default_rng(4).uniform(size=(20, 5))
+    mixture /= mixture.sum(axis=1, keepdims=True)
+    frames = np.arange(20) % 5
+    integrator = LayerIntegrator(neutral, triangles, mask)
+    given = integrator.integrate(coarse[frames], (mixture @ basis.T).reshape(20, -1, 9))
+    mixed = integrator.integrate_mixture(coarse[frames], mixture, basis)
+    np.testing.assert_allclose(mixed, given, atol=1e-4)  # mm
 
 
 @pytest.mark.parametrize("reach_mm", [45, 60, 84])
@@ -114,7 +141,7 @@ def test_a_part_that_hangs_on_the_mask_follows_it(reach_mm):
     mask = np.flatnonzero(((radius < reach_mm) & (radius > 14))[triangles].all(axis=1))
     layers = np.zeros((1, len(mask), 9))
     layers[..., 3:6] = 0.1
-    integrator = LayerIntegrator(neutral, triangles, mask)
+    integrator = LayerIntegrator(neutral, triangles, mask, seam_mm=0.0)
     moved = np.linalg.norm(integrator.integrate(neutral[None], layers)[0] - neutral, axis=1)
     inside = np.flatnonzero(radius < 10)
     assert np.isin(inside, integrator.free).all()

@@ -12,7 +12,8 @@ from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
 from vermilion.errors import InputError, ModelFileError
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
-from vermilion.regression.model import LipModel, load_model, save_model
+from vermilion.regression.kernel import KernelRegressor
+from vermilion.regression.model import FORMAT_VERSION, LipModel, load_model, save_model
 from vermilion.regression.training import (
     Selection,
     curve_table,
@@ -64,15 +65,40 @@ def test_round_trip(model, tmp_path):
     assert read.units == model.units
 
 
-def test_affine_round_trip(model, tmp_path):
+@pytest.mark.parametrize("kind", [AffineRegressor, KernelRegressor])
+def test_round_trip_of_other_regressors(model, tmp_path, kind):
     rng = np.random.default_rng(0)
-    affine = AffineRegressor(2.0).fit(rng.normal(size=(60, 3)), rng.normal(size=(60, 18)))
-    save_model(tmp_path / "a.h5", replace(model, estimator=affine, neutrals_mm={}))
+    fitted = kind(2.0, basis_error=0.2).fit(rng.normal(size=(60, 3)), rng.normal(size=(60, 18)))
+    written = replace(model, estimator=fitted, neutrals_mm={}, novelty_limit=3.5)
+    save_model(tmp_path / "a.h5", written)
+    read = load_model(tmp_path / "a.h5")
     features = rng.normal(size=(4, 4))
-    np.testing.assert_array_equal(
-        load_model(tmp_path / "a.h5").predict(features),
-        replace(model, estimator=affine, neutrals_mm={}).predict(features),
-    )
+    np.testing.assert_array_equal(read.predict(features), written.predict(features))
+    np.testing.assert_array_equal(read.novelty(features), written.novelty(features))
+    assert read.novelty_limit == 3.5
+    assert read.estimator.get_params() == fitted.get_params()
+
+
+def test_a_file_says_what_it_is_made_of(model, tmp_path):
+    """For a reader without Vermilion: version, units, features, and what was trained on."""
+    save_model(tmp_path / "MS.h5", model)
+    with h5py.File(tmp_path / "MS.h5") as file:
+        assert file.attrs["format"] == "vermilion-regressor"
+        assert file.attrs["format_version"] == FORMAT_VERSION
+        assert file.attrs["unit_layers"] == "rad, 1"
+        assert "unit_features" in file.attrs
+        assert [name.decode() for name in file["features/names"]] == list(NAMES)
+        assert sorted(file["training"]) == ["ana", "zoe"]
+        np.testing.assert_array_equal(file["training/zoe/rom"], np.arange(30))
+        assert file.attrs["topology_sha256"] == topology_hash(TRIANGLES)
+
+
+def test_an_older_file_says_so(model, tmp_path):
+    save_model(tmp_path / "MS.h5", model)
+    with h5py.File(tmp_path / "MS.h5", "a") as file:
+        file.attrs["format_version"] = 1
+    with pytest.raises(ModelFileError, match=r"format version 1, .*Train the regressor again"):
+        load_model(tmp_path / "MS.h5")
 
 
 def test_a_person_is_known_again_by_their_neutral(model):
@@ -210,7 +236,7 @@ def test_training_chooses_writes_and_reads(database, tmp_path):
     with LipDatabase(database) as read:
         data = read.training_set(["ana", "bo"])
         place = (read.feature_names, read.mask, read.area_mm2, read.topology)
-    for name in ("MS", "MS-affine", "MS-shape-only", "MS-distances-only"):
+    for name in ("MS", "MS-affine", "MS-kernel", "MS-shape-only", "MS-distances-only"):
         trained, curve = train(name, data, *place, Selection(folds=3, clip_frames=6))
         save_model(tmp_path / f"{name}.h5", trained)
         read = load_model(tmp_path / f"{name}.h5")

@@ -3,22 +3,24 @@
 import numpy as np
 import pytest
 from sklearn.base import clone
+from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
 from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.cross_validation import (
     clips_of,
-    cross_validate_affine,
-    cross_validate_rbf,
+    cross_validate,
+    held_out_novelty,
     target_gram,
 )
 from vermilion.regression.estimators import (
     AffineRegressor,
     RBFNetwork,
-    bias_of_a_stranger,
     gaussian_activations,
     temporal_prototypes,
 )
+from vermilion.regression.kernel import KernelRegressor
+from vermilion.regression.linear import bias_of_a_stranger
 from vermilion.regression.ridge import ridge_weights
 from vermilion.regression.scaling import feature_scale
 
@@ -90,17 +92,30 @@ def test_order_of_rows_does_not_matter(data):
 
 def test_large_alpha_leaves_the_mean(data):
     features, targets = data
-    for regressor in (RBFNetwork(alpha=1e12), AffineRegressor(alpha=1e12)):
+    for kind in (RBFNetwork, AffineRegressor, KernelRegressor):
+        regressor = kind(alpha=1e12)
         predicted = regressor.fit(features, targets).predict(features[:3])
         np.testing.assert_allclose(predicted, np.tile(targets.mean(axis=0), (3, 1)), atol=1e-8)
 
 
-def test_frames_last_is_the_same_prediction(data):
+def test_predictions_keep_the_precision_of_the_targets(data):
     features, targets = data
     network = RBFNetwork().fit(features, targets.astype(np.float32))
     assert network.predict(features).dtype == np.float32
+
+
+@pytest.mark.parametrize("allowed", [0.3, 0.1, 0.03])
+def test_a_basis_changes_predictions_by_no_more_than_is_allowed(data, allowed):
+    features, targets = data
+    whole = RBFNetwork(1e-3, 0.3).fit(features, targets)
+    small = RBFNetwork(1e-3, 0.3, basis_error=allowed).fit(features, targets)
+    assert small.basis_.shape[0] < whole.basis_.shape[0]
+    predicted = whole.predict(features)
+    spread = predicted - predicted.mean(axis=0)
+    change = np.linalg.norm(small.predict(features) - predicted)
+    assert change < allowed * np.linalg.norm(spread)
     np.testing.assert_allclose(
-        network.predict_frames_last(features).T, network.predict(features), atol=1e-5
+        small.predict(features).mean(axis=0), targets.mean(axis=0), atol=1e-9
     )
 
 
@@ -128,7 +143,7 @@ def test_a_group_keeps_its_proportions_and_weighs_as_much_as_any_other(data):
     assert variance[:3].sum() == pytest.approx(variance[3:].sum())
 
 
-@pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor])
+@pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor, KernelRegressor])
 def test_beyond_the_reach_the_prediction_is_drawn_to_the_mean(data, kind):
     features, targets = data
     low, high = features.min(axis=0), features.max(axis=0)
@@ -141,6 +156,51 @@ def test_beyond_the_reach_the_prediction_is_drawn_to_the_mean(data, kind):
     away = [np.linalg.norm(regressor.predict(edge + step) - mean) for step in (0, 2, 10, 1e6)]
     assert np.all(np.diff(away) < 0)
     assert away[-1] < 1e-6
+
+
+@pytest.mark.parametrize("linear", [0.0, 0.5])
+def test_the_kernel_regressor_is_kernel_ridge_on_all_frames(data, linear):
+    """Its low-rank factor against the dual with the whole kernel matrix, the mean taken out."""
+    features, targets = data
+    regressor = KernelRegressor(0.05, 2.0, linear, tolerance=1e-12).fit(features, targets)
+    scaled = regressor.scaled(features)
+    kernel = regressor.kernel(scaled, scaled)
+    centre = np.eye(120) - 1 / 120
+    dual = centre @ np.linalg.solve(centre @ kernel @ centre + 0.05 * np.eye(120), centre @ targets)
+    bias = targets.mean(axis=0) - kernel.mean(axis=0) @ dual
+    new = features[:9] + 0.3
+    expected = regressor.kernel(regressor.scaled(new), scaled) @ dual + bias
+    np.testing.assert_allclose(regressor.predict(new), expected, atol=1e-6)
+    peer = KernelRidge(alpha=0.05, kernel="precomputed").fit(centre @ kernel @ centre, targets)
+    np.testing.assert_allclose(centre @ peer.dual_coef_, dual, atol=1e-8)
+
+
+def test_variance_of_a_prediction_is_that_of_a_gaussian_process(data):
+    features, _ = data
+    regressor = KernelRegressor(0.05, 2.0, 0.5, tolerance=1e-12)
+    regressor.fit_inputs(features)
+    scaled, new = regressor.scaled(features), regressor.scaled(features[:9] + 0.3)
+    # A flat prior of the mean: a constant of large variance beside the kernel.
+    constant = 1e5
+    kernel = regressor.kernel(scaled, scaled) + constant
+    cross = regressor.kernel(new, scaled) + constant
+    prior = regressor.kernel(new, new).diagonal() + constant
+    noisy = np.linalg.solve(kernel + 0.05 * np.eye(120), cross.T)
+    variance = prior - (cross * noisy.T).sum(axis=1)
+    mean_alone = 0.05 / 120
+    np.testing.assert_allclose(
+        regressor.novelty(features[:9] + 0.3) ** 2, variance - mean_alone, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor, KernelRegressor])
+def test_held_out_clips_are_more_novel_than_frames_trained_on(data, kind):
+    features, targets = data
+    sequences = np.zeros(120)
+    held = held_out_novelty(kind(), features, sequences, clips_of(sequences, 20, 4), 4)
+    known = kind().fit(features, targets).novelty(features)
+    assert np.median(held) > np.median(known)
+    assert kind().fit(features, targets).novelty(features[:1] + 1e3)[0] > held.max()
 
 
 def test_a_constant_feature_says_nothing(data):
@@ -179,13 +239,11 @@ def test_cross_validation_equals_fitting_and_predicting(data):
     clips = clips_of(sequences, 15, 5)
     alphas, betas = [1e-4, 1e-2, 10.0], [0.1, 3.0]
     groups = ["a"] * 3 + ["b"] * 4
-    curve = cross_validate_rbf(
-        features, target_gram(targets, weights), weights.sum(), sequences, clips,
-        alphas=alphas, betas=betas, feature_groups=groups, reach=0.1,
-    )  # fmt: skip
-    affine = cross_validate_affine(
-        features, target_gram(targets, weights), weights.sum(), clips, alphas=alphas
-    )
+    given = (features, target_gram(targets, weights), weights.sum(), sequences, clips)
+    network = RBFNetwork(feature_groups=groups, reach=0.1)
+    curve = cross_validate(network, *given, alphas=alphas, betas=betas)
+    affine = cross_validate(AffineRegressor(), *given, alphas=alphas)
+    kernel = cross_validate(KernelRegressor(), *given, alphas=alphas, betas=betas)
     for k, (train, held) in enumerate(GroupKFold(5).split(clips, groups=clips)):
 
         def error(regressor, train=train, held=held):
@@ -198,6 +256,8 @@ def test_cross_validation_equals_fitting_and_predicting(data):
                 network = RBFNetwork(alpha, beta, feature_groups=groups, reach=0.1)
                 plain = error(network)
                 assert curve.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
+                plain = error(KernelRegressor(alpha, beta))
+                assert kernel.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
             assert affine.errors[0, j, k] == pytest.approx(error(AffineRegressor(alpha)), rel=1e-5)
 
 
@@ -206,9 +266,10 @@ def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(dat
     persons = np.repeat([0, 1, 2], [50, 60, 10])
     targets = targets + 5.0 * persons[:, None]
     clips = clips_of(persons, 10, 4)
-    curve = cross_validate_affine(
-        features, target_gram(targets), 30, clips, alphas=[0.1], n_folds=4, persons=persons
-    )
+    curve = cross_validate(
+        AffineRegressor(), features, target_gram(targets), 30, persons, clips,
+        alphas=[0.1], n_folds=4, persons=persons,
+    )  # fmt: skip
     for k, (train, held) in enumerate(GroupKFold(4).split(clips, groups=clips)):
         people, label = np.unique(persons[train], return_inverse=True)
         regressor = AffineRegressor(0.1).fit(features[train], targets[train], persons=label)
@@ -249,9 +310,10 @@ def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
 def test_choice_takes_the_smoothest_within_one_standard_error(data):
     features, targets = data
     clips = clips_of(np.zeros(120), 15, 5)
-    curve = cross_validate_affine(
-        features, target_gram(targets), 30, clips, alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3]
-    )
+    curve = cross_validate(
+        AffineRegressor(), features, target_gram(targets), 30, np.zeros(120), clips,
+        alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3],
+    )  # fmt: skip
     least, simplest = curve.choose("least"), curve.choose("simplest")
     assert curve.mean[least] == curve.mean.min()
     assert curve.freedom[simplest] <= curve.freedom[least]

@@ -100,9 +100,10 @@ class EvaluationConfig(StageConfig):
     reference: ReferenceConfig = Field(
         default_factory=ReferenceConfig, description="How a vertex finds its counterpart."
     )
-    variants: list[Literal["affine", "shape-only", "distances-only"]] = Field(
+    variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only"]] = Field(
         [],
-        description="Variants of the regressors to evaluate beside them; training must make them.",
+        description="Variants of the regressors to train and evaluate beside them: another estimator, "
+        "or the configured one on some of the features.",
     )
     measures: MeasuresConfig = Field(
         default_factory=MeasuresConfig, description="Figures and their intervals."

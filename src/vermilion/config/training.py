@@ -14,6 +14,12 @@ Positive = Annotated[float, Field(gt=0.0)]
 class TrainingConfig(StageConfig):
     """Regressors from features to correction layers (Lips16 5.2)."""
 
+    regressor: Literal["rbf", "affine", "kernel"] = Field(
+        "rbf",
+        description="Estimator of PS, MS and GR. `rbf`: the paper's network. `affine`: its simple "
+        "alternative. `kernel`: kernel ridge regression on all frames, with a predictive variance. "
+        "The others can be evaluated beside it (`evaluation.variants`).",
+    )
     prototype_stride: int = Field(
         10, ge=1, le=1000, description="Every how many training frames become a prototype (frames)."
     )
@@ -45,6 +51,21 @@ class TrainingConfig(StageConfig):
         min_length=1,
         description="Tikhonov parameters of the affine regressor that cross-validation tries.",
     )
+    kernel_alphas: list[Positive] = Field(
+        [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0],
+        min_length=1,
+        description="Noise variances of the kernel regressor that cross-validation tries.",
+    )
+    kernel_betas: list[Positive] = Field(
+        [0.01, 0.03, 0.1, 0.3, 1.0],
+        min_length=1,
+        description="Scales of the kernel regressor's Gaussians that cross-validation tries.",
+    )
+    kernel_linear: float = Field(
+        1.0,
+        ge=0.0,
+        description="Variance of the kernel regressor's linear part beside that of the smooth one.",
+    )
     folds: int = Field(5, ge=2, le=50, description="Folds of the cross-validation.")
     clip_frames: int = Field(
         30,
@@ -72,9 +93,25 @@ class TrainingConfig(StageConfig):
         "`simplest`: the one with the fewest effective degrees of freedom within one standard error "
         "of it.",
     )
+    basis_error: float = Field(
+        0.03,
+        ge=0.0,
+        lt=1.0,
+        description="Predictions are made in a basis of few layers, the principal components of what "
+        "is predicted. How much leaving the others out may change a prediction (root mean square, as "
+        "a share of that of the predictions about their mean); 0 leaves nothing out.",
+    )
     bias: Literal["person", "shared"] = Field(
         "person",
         description="`person`: each person of the training has a bias of their own, which takes the "
         "identity in the layers, and is used again where the same person is corrected. `shared`: one "
         "bias, as in the paper.",
+    )
+    novelty_quantile: float = Field(
+        0.99,
+        gt=0.0,
+        le=1.0,
+        description="A corrected frame is reported as outside the training's span where its novelty "
+        "is above that of this share of the training frames, each judged by a training without its "
+        "clips.",
     )

@@ -23,8 +23,6 @@ from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.regression.model import LipModel
 
-BLOCK = 16  # frames solved together: enough to use the cache, little enough to stay in it
-
 
 class Corrector:
     """A regressor bound to a person's mesh: factors once, corrects any number of frames."""
@@ -37,19 +35,20 @@ class Corrector:
         seam_mm: float = 16.0,
     ):
         model.check_topology(triangles)
-        self.model, self.neutral_mm = model, np.asarray(neutral_mm, dtype=np.float64)
+        self.model = model
         self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm)
+        basis, bias = model.basis(np.asarray(neutral_mm, dtype=np.float64))
+        # The bias is one layer more, of which every frame has one.
+        layers = np.concatenate([basis, bias[None]]).reshape(len(basis) + 1, -1)
+        self._basis = np.ascontiguousarray(layers.T, dtype=np.float32)
 
     def correct(self, coarse_mm: np.ndarray, features: np.ndarray) -> np.ndarray:
         """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame."""
-        corrected = np.array(coarse_mm, dtype=np.float64)
-        for first in range(0, len(corrected), BLOCK):
-            part = slice(first, first + BLOCK)
-            layers = self.model.predict_frames_last(features[part], self.neutral_mm)
-            corrected[part, self.integrator.free] += self.integrator.displacements(
-                corrected[part], layers
-            )
-        return corrected
+        mixture = self.model.mixture(features)
+        one = np.ones((len(mixture), 1))
+        return self.integrator.integrate_mixture(
+            coarse_mm, np.concatenate([mixture, one], axis=1), self._basis
+        )
 
 
 def correct_sequence(
@@ -100,6 +99,6 @@ def correct_with_layers(
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
     corrected = np.array(coarse_mm, dtype=np.float64)
     corrected[usable] = world_from_head(
-        integrator.integrate(head, layers[usable], BLOCK), rotation[usable], translation_mm[usable]
+        integrator.integrate(head, layers[usable]), rotation[usable], translation_mm[usable]
     )
     return corrected

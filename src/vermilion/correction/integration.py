@@ -8,17 +8,27 @@ mesh x minimises, over the free vertices of the domain,
 with cotangent weights w of the neutral, G_t = I outside the mask, and x = c at fixed vertices. For
 the displacement d = x - c only mask triangles have a right-hand side, (G_t - I)(c_i - c_j), and the
 matrix depends on the neutral alone: it is factored once a topology and person, and all coordinates
-of all frames of a block are solved together. Cotangents are kept positive, so that the matrix is
+of a block of frames are solved together. Cotangents are kept positive, so that the matrix is
 definite on any mesh; weights do not matter where a mesh with these gradients exists: it is returned.
 """
 
 from __future__ import annotations
 
-import numba
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 
 from vermilion.correction.domain import integration_domain
+from vermilion.correction.right_side import (
+    LANES,
+    TURN_SERIES,
+    accumulate,
+    accumulate_mixture,
+    add_frames,
+    gather,
+    turn_limits,
+)
 from vermilion.sparse import CholeskyFactor
 
 _COTANGENT_RANGE = (0.02, 50.0)
@@ -64,38 +74,72 @@ class LayerIntegrator:
         self._corners = np.searchsorted(self._local, inside).astype(np.int32)
         self.weights = weights
 
-    def integrate(self, coarse: np.ndarray, layers: np.ndarray, block: int = 32) -> np.ndarray:
-        """Corrected vertices, (F, V, 3) float64.
+    def integrate(self, coarse: np.ndarray, layers: np.ndarray) -> np.ndarray:
+        """Corrected vertices, (F, V, 3) float64, by given layers: in double precision throughout.
 
         Args:
             coarse: (F, V, 3), in the layers' frame (the canonical head frame).
             layers: (F, M, 9).
-            block: frames solved together; changes no result.
         """
-        coarse = np.asarray(coarse, dtype=np.float64)
         if layers.shape != (len(coarse), len(self.mask), 9):
             raise ValueError(
                 f"layers must be ({len(coarse)}, {len(self.mask)}, 9), got {layers.shape}"
             )
-        corrected = coarse.copy()
-        for first in range(0, len(coarse), block):
-            part = slice(first, first + block)
-            frames_last = np.ascontiguousarray(np.transpose(layers[part], (1, 2, 0)))
-            corrected[part, self.free] += self.displacements(coarse[part], frames_last)
+        frames_last = np.zeros((len(self.mask), 9, LANES))
+
+        def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
+            given = layers[part]
+            frames_last[..., : len(given)] = np.transpose(given, (1, 2, 0))
+            accumulate(*self._triangles(points), frames_last, *_series(points.dtype), right)
+
+        return self._corrected(coarse, add_to, np.float64)
+
+    def integrate_mixture(
+        self, coarse: np.ndarray, mixture: np.ndarray, basis: np.ndarray
+    ) -> np.ndarray:
+        """Corrected vertices, (F, V, 3) float64, by the layers `mixture @ basis.T`.
+
+        The layers are never all in memory, and right-hand sides are made in the precision of the
+        basis: in single precision the vertices are good to 1e-4 mm.
+
+        Args:
+            coarse: (F, V, 3), in the canonical head frame.
+            mixture: (F, R).
+            basis: (M * 9, R), contiguous.
+        """
+        lanes = np.zeros((basis.shape[1], LANES), dtype=basis.dtype)
+
+        def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
+            given = mixture[part]
+            lanes[:, : len(given)] = given.T
+            accumulate_mixture(*self._triangles(points), basis, lanes, *_series(basis.dtype), right)
+
+        return self._corrected(coarse, add_to, basis.dtype)
+
+    def _triangles(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
+        return self._corners, self._row, self.weights.astype(points.dtype, copy=False), points
+
+    def _corrected(
+        self,
+        coarse: np.ndarray,
+        add_to: Callable[[np.ndarray, np.ndarray, slice], None],
+        precision: np.dtype,
+    ) -> np.ndarray:
+        """Solve for the frames in blocks of LANES; which frames share a block changes no result."""
+        corrected = np.array(coarse, dtype=np.float64)
+        points = np.empty((len(self._local), 3, LANES), dtype=precision)
+        right = np.empty((len(self.free) + 1, 3, LANES))
+        for first in range(0, len(corrected), LANES):
+            block = corrected[first : first + LANES]
+            gather(block, self._local, points)
+            right[:] = 0.0
+            add_to(right, points, slice(first, first + LANES))
+            add_frames(block, self.free, self.factor.solve(right[:-1, :, : len(block)]))
         return corrected
 
-    def displacements(self, coarse: np.ndarray, layers_frames_last: np.ndarray) -> np.ndarray:
-        """What to add to the free vertices, (F, N, 3); layers are (M, 9, F), the fast order."""
-        right = self.right_side(coarse, layers_frames_last)
-        solution = self.factor.solve(right.reshape(len(self.free), -1))
-        return np.transpose(solution.reshape(right.shape), (2, 0, 1))
 
-    def right_side(self, coarse: np.ndarray, layers_frames_last: np.ndarray) -> np.ndarray:
-        """Divergence of the wanted edge changes, (N, 3, F)."""
-        corners = np.ascontiguousarray(np.transpose(coarse[:, self._local], (1, 2, 0)))
-        right = np.zeros((len(self.free) + 1, 3, corners.shape[2]))
-        _accumulate(self._corners, self._row, self.weights, corners, layers_frames_last, right)
-        return right[:-1]
+def _series(precision: np.dtype) -> tuple[np.ndarray, np.ndarray]:
+    return TURN_SERIES[np.dtype(precision)], turn_limits(precision)
 
 
 def cotangents(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -121,57 +165,3 @@ def edge_stiffness(
     columns = np.concatenate([first, second, second, first])
     data = np.concatenate([values, values, -values, -values])
     return sparse.csr_matrix((data, (rows, columns)), shape=(n_vertices, n_vertices))
-
-
-# sin(a)/a and (1 - cos(a))/a^2 as series in a^2: to rounding for a turn of pi, 1e-8 at 2 pi. Only
-# additions and products, so that the loop over frames runs in vector registers.
-_TERMS = 15
-_factorials = np.cumprod(np.arange(1.0, 2 * _TERMS + 3))
-_SINE = (-1.0) ** np.arange(_TERMS) / _factorials[0 : 2 * _TERMS : 2]
-_COSINE = (-1.0) ** np.arange(_TERMS) / _factorials[1 : 2 * _TERMS + 1 : 2]
-_MAX_SQUARED_TURN = 39.0
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"}, error_model="numpy")
-def _accumulate(corners, row, weights, points, layers, right):
-    """right[i] += w (G - I) e for the edges e of every mask triangle; frames are innermost."""
-    n_frames = points.shape[2]
-    change = np.empty((2, 3, n_frames))
-    for t in range(corners.shape[0]):
-        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
-        layer = layers[t]
-        for f in range(n_frames):
-            x, y, z = float(layer[0, f]), float(layer[1, f]), float(layer[2, f])
-            turn = min(x * x + y * y + z * z, _MAX_SQUARED_TURN)
-            sine, cosine = _SINE[_TERMS - 1], _COSINE[_TERMS - 1]
-            for k in range(_TERMS - 2, -1, -1):
-                sine = sine * turn + _SINE[k]
-                cosine = cosine * turn + _COSINE[k]
-            sxx, syy, szz = layer[3, f], layer[4, f], layer[5, f]
-            sxy, sxz, syz = layer[6, f], layer[7, f], layer[8, f]
-            for edge in range(2):
-                end = b if edge == 0 else c
-                ex = points[end, 0, f] - points[a, 0, f]
-                ey = points[end, 1, f] - points[a, 1, f]
-                ez = points[end, 2, f] - points[a, 2, f]
-                # p = (S - I) e, then d = (Q - I)(e + p) + p = (G - I) e
-                px = sxx * ex + sxy * ey + sxz * ez
-                py = sxy * ex + syy * ey + syz * ez
-                pz = sxz * ex + syz * ey + szz * ez
-                qx, qy, qz = ex + px, ey + py, ez + pz
-                cx, cy, cz = y * qz - z * qy, z * qx - x * qz, x * qy - y * qx
-                dx, dy, dz = y * cz - z * cy, z * cx - x * cz, x * cy - y * cx
-                change[edge, 0, f] = sine * cx + cosine * dx + px
-                change[edge, 1, f] = sine * cy + cosine * dy + py
-                change[edge, 2, f] = sine * cz + cosine * dz + pz
-        opposite_a, opposite_b, opposite_c = weights[t, 0], weights[t, 1], weights[t, 2]
-        ra, rb, rc = row[a], row[b], row[c]
-        for k in range(3):
-            for f in range(n_frames):
-                ab, ac = change[0, k, f], change[1, k, f]
-                flow_ab = opposite_c * ab
-                flow_ac = opposite_b * ac
-                flow_bc = opposite_a * (ac - ab)
-                right[ra, k, f] -= flow_ab + flow_ac
-                right[rb, k, f] += flow_ab - flow_bc
-                right[rc, k, f] += flow_ac + flow_bc

@@ -10,8 +10,7 @@ import numpy as np
 from vermilion.correction.apply import Corrector, correct_with_layers
 from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.regression.model import LipModel
-
-VARIANTS = ("affine", "shape-only", "distances-only")
+from vermilion.regression.training import VARIANTS
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def corrected_by_truth(
 
 def measure_name(file_stem: str) -> str:
     """Name in `measures.tsv` of a model file: `PS-s1-affine` -> `PS-s1/affine`."""
-    for variant in VARIANTS:
+    for variant in filter(None, VARIANTS):
         if file_stem.endswith(f"-{variant}"):
             return f"{file_stem.removesuffix(f'-{variant}')}/{variant}"
     return file_stem

@@ -8,22 +8,19 @@ test holds the result against plain fitting and predicting.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy import linalg, sparse
+from sklearn.base import clone
 from sklearn.model_selection import GroupKFold
 
-from vermilion.regression.estimators import gaussian_activations, temporal_prototypes
+from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.ridge import person_averages
-from vermilion.regression.scaling import feature_range, feature_scale, trust
 
 Rule = Literal["simplest", "least"]
-
-#: (rows to train on, rows to judge) -> their activations.
-DesignOfFold = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -101,7 +98,8 @@ def target_gram(targets: np.ndarray, output_weights: np.ndarray | None = None) -
     return gram
 
 
-def cross_validate_rbf(
+def cross_validate(
+    estimator: LinearOutputs,
     features: np.ndarray,
     gram: np.ndarray,
     n_outputs: float,
@@ -109,119 +107,75 @@ def cross_validate_rbf(
     clips: np.ndarray,
     *,
     alphas: Sequence[float],
-    betas: Sequence[float],
+    betas: Sequence[float] | None = None,
     n_folds: int = 5,
-    prototype_stride: int = 10,
-    prototype_minimum: int = 20,
-    feature_groups: Sequence[str] | None = None,
-    reach: float = np.inf,
-    fade: float = 2.0,
     persons: np.ndarray | None = None,
 ) -> Curve:
-    """Errors of `RBFNetwork` on a grid.
-
-    Scale and prototypes come from the rows trained on.
+    """Errors of an estimator on a grid, all that it fits coming from the rows trained on.
 
     Args:
+        estimator: with every parameter but alpha and beta as wanted; it is not changed.
         features: (F, M).
         gram: (F, F), `target_gram` of the targets.
         n_outputs: the sum of the output weights (their number where unweighted).
-        sequences: (F,) labels of the sequences.
+        sequences: (F,) labels of the sequences, frames in order of time.
         clips: (F,) labels of the clips, which are held out whole.
+        betas: None for an estimator without.
         persons: (F,) in 0 .. G - 1 for a bias each, or None.
     """
     persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
-
-    def design_of(beta: float) -> DesignOfFold:
-        def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            scaled, counts = _scaled(features, train, feature_groups, reach, fade)
-            chosen = temporal_prototypes(sequences[train], prototype_stride, prototype_minimum)
-            prototypes = scaled[train[chosen]]
-            activations = gaussian_activations(scaled, prototypes, beta)
-            mean = activations[train].mean(axis=0)
-            return activations[train], (mean + counts * (activations - mean))[held]
-
-        return design
-
-    errors = [
-        _fold_errors(design_of(b), gram, clips, persons, alphas, n_folds, n_outputs) for b in betas
-    ]
+    folds = folds_of(clips, n_folds)
+    errors, freedom = [], []
+    for beta in [np.nan] if betas is None else betas:
+        tried = clone(estimator)
+        if betas is not None:
+            tried.set_params(beta=beta)
+        of_folds = []
+        for train, held in folds:
+            design = tried.fit_inputs(features[train], sequences[train])
+            judged = tried.activations(features[held])
+            squared = _held_out_squared(design, judged, gram, train, held, persons, alphas)
+            of_folds.append(np.sqrt(np.maximum(squared, 0.0) / (len(held) * n_outputs)))
+        errors.append(np.stack(of_folds, axis=1))
+        freedom.append(_degrees_of_freedom(tried.fit_inputs(features, sequences), alphas))
     return Curve(
         np.asarray(alphas, float),
-        np.asarray(betas, float),
-        np.stack([e for e, _ in errors]),
-        errors[0][1],
-        np.stack([_degrees_of_freedom(design_of(b), len(features), alphas) for b in betas]),
+        np.array([np.nan]) if betas is None else np.asarray(betas, float),
+        np.stack(errors),
+        np.array([len(held) for _, held in folds]),
+        np.stack(freedom),
     )
 
 
-def cross_validate_affine(
+def held_out_novelty(
+    estimator: LinearOutputs,
     features: np.ndarray,
-    gram: np.ndarray,
-    n_outputs: float,
+    sequences: np.ndarray,
     clips: np.ndarray,
-    *,
-    alphas: Sequence[float],
-    n_folds: int = 5,
-    feature_groups: Sequence[str] | None = None,
-    reach: float = np.inf,
-    fade: float = 2.0,
-    persons: np.ndarray | None = None,
-) -> Curve:
-    """Errors of `AffineRegressor` for every alpha; arguments as `cross_validate_rbf`."""
-    persons = np.zeros(len(features), dtype=np.int64) if persons is None else persons
-
-    def design(train: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        scaled, counts = _scaled(features, train, feature_groups, reach, fade)
-        mean = scaled[train].mean(axis=0)
-        return scaled[train], (mean + counts * (scaled - mean))[held]
-
-    errors, frames = _fold_errors(design, gram, clips, persons, alphas, n_folds, n_outputs)
-    freedom = _degrees_of_freedom(design, len(features), alphas)[None]
-    return Curve(np.asarray(alphas, float), np.array([np.nan]), errors[None], frames, freedom)
-
-
-def _degrees_of_freedom(
-    design_of: DesignOfFold, n_rows: int, alphas: Sequence[float]
-) -> np.ndarray:
-    """Trace of the map from targets to fitted values, the bias left out, (A,)."""
-    everything = np.arange(n_rows)
-    activations, _ = design_of(everything, everything[:0])
-    activations = activations - activations.mean(axis=0)
-    eigenvalues = np.maximum(linalg.eigvalsh(activations.T @ activations), 0.0)
-    return (eigenvalues / (eigenvalues + np.asarray(alphas, float)[:, None])).sum(axis=1)
-
-
-def _scaled(
-    features: np.ndarray, train: np.ndarray, groups: Sequence[str] | None, reach: float, fade: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """All features (F, M) in the scale and reach of the rows trained on, and their trust (F, 1)."""
-    mean, scale = feature_scale(features[train], groups)
-    scaled = (features - mean) / scale
-    within = np.clip(scaled, *feature_range(scaled[train], reach))
-    return within, trust(scaled, within, fade)
-
-
-def _fold_errors(
-    design_of: DesignOfFold,
-    gram: np.ndarray,
-    clips: np.ndarray,
-    persons: np.ndarray,
-    alphas: Sequence[float],
     n_folds: int,
-    n_outputs: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """RMS errors (A, folds) and held-out frames (folds,)."""
+) -> np.ndarray:
+    """Novelty (F,) of every frame for a training that has not seen its clip."""
+    novelty = np.empty(len(features))
+    for train, held in folds_of(clips, n_folds):
+        tried = clone(estimator)
+        tried.fit_inputs(features[train], sequences[train])
+        novelty[held] = tried.novelty(features[held])
+    return novelty
+
+
+def folds_of(clips: np.ndarray, n_folds: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows to train on and rows to judge of each fold; clips (F,) stay whole."""
     n_folds = min(n_folds, len(np.unique(clips)))
     if n_folds < 2:
         raise ValueError("cross-validation needs at least two clips")
-    folds = GroupKFold(n_folds).split(clips, groups=clips)
-    errors, frames = [], []
-    for train, held in folds:
-        squared = _held_out_squared(*design_of(train, held), gram, train, held, persons, alphas)
-        errors.append(np.sqrt(np.maximum(squared, 0.0) / (len(held) * n_outputs)))
-        frames.append(len(held))
-    return np.stack(errors, axis=1), np.array(frames)
+    return list(GroupKFold(n_folds).split(clips, groups=clips))
+
+
+def _degrees_of_freedom(design: np.ndarray, alphas: Sequence[float]) -> np.ndarray:
+    """Trace of the map from targets to fitted values, the bias left out, (A,)."""
+    centred = design - design.mean(axis=0)
+    eigenvalues = np.maximum(linalg.eigvalsh(centred.T @ centred), 0.0)
+    return (eigenvalues / (eigenvalues + np.asarray(alphas, float)[:, None])).sum(axis=1)
 
 
 def _held_out_squared(

@@ -7,34 +7,20 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from sklearn.base import BaseEstimator
 
 import vermilion
 from vermilion.correspondence.correspondence import topology_hash
 from vermilion.errors import ModelFileError
 from vermilion.files import atomic_path
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
+from vermilion.regression.kernel import KernelRegressor
+from vermilion.regression.linear import LinearOutputs
 
 FORMAT = "vermilion-regressor"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 #: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
 SAME_PERSON_MM = 0.05
-ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor}
-_COMMON = (
-    "weights_",
-    "bias_",
-    "person_biases_",
-    "feature_mean_",
-    "feature_scale_",
-    "feature_low_",
-    "feature_high_",
-    "mean_activation_",
-)
-_ARRAYS = {"rbf": ("prototypes_", *_COMMON), "affine": _COMMON}
-_SETTINGS = {
-    "rbf": ("alpha", "beta", "prototype_stride", "prototype_minimum", "reach", "fade"),
-    "affine": ("alpha", "reach", "fade"),
-}
+ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor, "kernel": KernelRegressor}
 
 
 @dataclass(frozen=True)
@@ -51,17 +37,19 @@ class LipModel:
         training_frames: `subject/take` -> (n,) frame numbers trained on.
         neutrals_mm: subject -> (V, 3) coarse neutral of each person with a bias of their own, in the
             order of the biases; empty for one shared bias.
+        novelty_limit: `novelty` above which a frame is outside the training's span.
         units: what the features and layers are measured in.
     """
 
     name: str
-    estimator: BaseEstimator
+    estimator: LinearOutputs
     feature_names: tuple[str, ...]
     feature_columns: np.ndarray
     mask: np.ndarray
     topology: str
     training_frames: dict[str, np.ndarray]
     neutrals_mm: dict[str, np.ndarray] = field(default_factory=dict)
+    novelty_limit: float = np.inf
     units: dict[str, str] = field(
         default_factory=lambda: {"layers": "rad, 1", "features": "see feature_names"}
     )
@@ -92,23 +80,18 @@ class LipModel:
         flat = self.estimator.predict(self._chosen(features), person)
         return flat.reshape(len(features), -1, 9)
 
-    def predict_frames_last(
-        self, features: np.ndarray, neutral_mm: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Layers (T, 9, F): the order that the integration reads fastest."""
-        person = self.person_of(neutral_mm)
-        flat = self.estimator.predict_frames_last(self._chosen(features), person)
-        return flat.reshape(len(self.mask), 9, len(features))
+    def mixture(self, features: np.ndarray) -> np.ndarray:
+        """Coefficients (F, R) of the layers' basis, of features (F, M)."""
+        return self.estimator.mixture(self._chosen(features))
+
+    def basis(self, neutral_mm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Basis (R, T, 9) and bias (T, 9): layers are `mixture @ basis + bias`."""
+        bias = self.estimator.bias_of(self.person_of(neutral_mm))
+        return self.estimator.basis_.reshape(-1, len(self.mask), 9), bias.reshape(-1, 9)
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """How far features lie from what was trained on, (F,).
-
-        The distance to the nearest prototype (to the mean, for an affine regressor) in units where
-        two training frames are 1.4 apart in the root mean square.
-        """
-        scaled = self.estimator.scaled(self._chosen(features))
-        known = getattr(self.estimator, "prototypes_", np.zeros((1, scaled.shape[1])))
-        return np.sqrt(((scaled[:, None] - known[None]) ** 2).sum(axis=2).min(axis=1))
+        """How far features (F, M) lie from what was trained on, (F,); see the estimators."""
+        return self.estimator.novelty(self._chosen(features))
 
     def check_topology(self, triangles: np.ndarray, path: str | Path | None = None) -> None:
         """Raise ModelFileError where a mesh's triangles (T, 3) are not those of the training."""
@@ -141,11 +124,12 @@ def save_model(path: str | Path, model: LipModel) -> None:
             name=model.name,
             estimator=kind,
             topology_sha256=model.topology,
+            novelty_limit=model.novelty_limit,
             **{f"unit_{name}": unit for name, unit in sorted(model.units.items())},
         )
-        for setting in _SETTINGS[kind]:
+        for setting in _settings(ESTIMATORS[kind]):
             file.attrs[setting] = getattr(model.estimator, setting)
-        for name in _ARRAYS[kind]:
+        for name in model.estimator.FITTED:
             _put(file, f"estimator/{name.rstrip('_')}", getattr(model.estimator, name))
         if model.estimator.feature_groups is not None:
             _put(file, "estimator/feature_groups", np.array(model.estimator.feature_groups, "S"))
@@ -187,6 +171,13 @@ def _check_header(file: h5py.File, path: str | Path) -> None:
             path=path,
         )
     version = int(file.attrs["format_version"])
+    if version < FORMAT_VERSION:
+        raise ModelFileError(
+            f"format version {version}, of an older Vermilion",
+            f"version {FORMAT_VERSION}",
+            "Train the regressor again with this version.",
+            path=path,
+        )
     if version > FORMAT_VERSION:
         raise ModelFileError(
             f"format version {version}, written by Vermilion {file.attrs['vermilion_version']}",
@@ -198,11 +189,11 @@ def _check_header(file: h5py.File, path: str | Path) -> None:
 
 def _read(file: h5py.File) -> LipModel:
     kind = str(file.attrs["estimator"])
-    settings = {name: file.attrs[name].item() for name in _SETTINGS[kind]}
+    settings = {name: file.attrs[name].item() for name in _settings(ESTIMATORS[kind])}
     if "estimator/feature_groups" in file:
         settings["feature_groups"] = _strings(file["estimator/feature_groups"])
     estimator = ESTIMATORS[kind](**settings)
-    for name in _ARRAYS[kind]:
+    for name in estimator.FITTED:
         setattr(estimator, name, file[f"estimator/{name.rstrip('_')}"][:])
     estimator.n_features_in_ = len(estimator.feature_mean_)
     training: dict[str, np.ndarray] = {}
@@ -220,8 +211,14 @@ def _read(file: h5py.File) -> LipModel:
         topology=str(file.attrs["topology_sha256"]),
         training_frames=training,
         neutrals_mm={name: neutral[:] for name, neutral in persons},
+        novelty_limit=float(file.attrs["novelty_limit"]),
         units=units,
     )
+
+
+def _settings(kind: type[LinearOutputs]) -> list[str]:
+    """Names of the numeric parameters of an estimator."""
+    return [name for name in kind().get_params() if name != "feature_groups"]
 
 
 def _strings(dataset: h5py.Dataset) -> list[str]:

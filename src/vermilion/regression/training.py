@@ -15,19 +15,25 @@ from vermilion.regression.cross_validation import (
     Curve,
     Rule,
     clips_of,
-    cross_validate_affine,
-    cross_validate_rbf,
+    cross_validate,
+    held_out_novelty,
     target_gram,
 )
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
+from vermilion.regression.kernel import KernelRegressor
+from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.model import LipModel
 
-#: Variant -> (estimator, features).
-VARIANTS = {
-    "": ("rbf", "all"),
+Kind = Literal["rbf", "affine", "kernel"]
+
+#: Variant -> (estimator, features); None is the estimator of the configuration.
+VARIANTS: dict[str, tuple[Kind | None, str]] = {
+    "": (None, "all"),
+    "rbf": ("rbf", "all"),
     "affine": ("affine", "all"),
-    "shape-only": ("rbf", "shape"),
-    "distances-only": ("rbf", "distances"),
+    "kernel": ("kernel", "all"),
+    "shape-only": (None, "shape"),
+    "distances-only": (None, "distances"),
 }
 
 
@@ -35,18 +41,51 @@ VARIANTS = {
 class Selection:
     """How the parameters are chosen; the fields are those of the configuration's `training`."""
 
+    regressor: Kind = "rbf"
     prototype_stride: int = 10
     prototype_minimum: int = 20
     scaling: Literal["group", "feature"] = "group"
     alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
     betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
     affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
+    kernel_alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+    kernel_betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
+    kernel_linear: float = 1.0
     folds: int = 5
     clip_frames: int = 30
     reach: float = 0.0
     fade: float = 2.0
     choice: Rule = "least"
+    basis_error: float = 0.03
     bias: Literal["person", "shared"] = "person"
+    novelty_quantile: float = 0.99
+
+    def estimator(self, kind: Kind, groups: Sequence[str] | None) -> LinearOutputs:
+        """An estimator that lacks only alpha and beta."""
+        shared = {
+            "feature_groups": groups,
+            "reach": self.reach,
+            "fade": self.fade,
+            "basis_error": self.basis_error,
+        }
+        if kind == "affine":
+            return AffineRegressor(**shared)
+        if kind == "kernel":
+            return KernelRegressor(linear=self.kernel_linear, **shared)
+        return RBFNetwork(
+            prototype_stride=self.prototype_stride,
+            prototype_minimum=self.prototype_minimum,
+            **shared,
+        )
+
+    def grid(self, kind: Kind) -> dict[str, list[float] | None]:
+        """`alphas` and `betas` to try, ascending."""
+        alphas, betas = {
+            "rbf": (self.alphas, self.betas),
+            "affine": (self.affine_alphas, None),
+            "kernel": (self.kernel_alphas, self.kernel_betas),
+        }[kind]
+        return {"alphas": sorted(alphas), "betas": None if betas is None else sorted(betas)}
 
 
 def split_name(regressor: str) -> tuple[str, str | None, str]:
@@ -101,7 +140,8 @@ def train(
         mask, area_mm2: (T,) the layer's triangles and their areas, which weight the errors.
         topology: hash of the coarse topology.
     """
-    estimator_kind, wanted = VARIANTS[split_name(name)[2]]
+    kind, wanted = VARIANTS[split_name(name)[2]]
+    kind = kind or selection.regressor
     kinds = np.array([feature_group(feature) for feature in feature_names])
     columns = np.flatnonzero((kinds == wanted) | (wanted == "all"))
     if not len(columns):
@@ -113,41 +153,26 @@ def train(
     features = data.features[:, columns].astype(np.float64)
     groups = list(kinds[columns]) if selection.scaling == "group" else None
     weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
-    gram = target_gram(data.layers, weights)
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
     persons = data.persons if selection.bias == "person" else None
-    common = {"n_folds": selection.folds, "feature_groups": groups, "persons": persons}
-    beyond = {"reach": selection.reach, "fade": selection.fade}
-    common |= beyond
-    if estimator_kind == "affine":
-        curve = cross_validate_affine(
-            features, gram, weights.sum(), clips, alphas=sorted(selection.affine_alphas), **common
-        )
-        _, chosen = curve.choose(selection.choice)
-        estimator = AffineRegressor(float(curve.alphas[chosen]), groups, **beyond)
-        estimator.fit(features, data.layers, persons=persons)
-    else:
-        prototypes = {
-            "prototype_stride": selection.prototype_stride,
-            "prototype_minimum": selection.prototype_minimum,
-        }
-        curve = cross_validate_rbf(
-            features,
-            gram,
-            weights.sum(),
-            data.sequences,
-            clips,
-            alphas=sorted(selection.alphas),
-            betas=sorted(selection.betas),
-            **prototypes,
-            **common,
-        )
-        row, column = curve.choose(selection.choice)
-        alpha, beta = float(curve.alphas[column]), float(curve.betas[row])
-        estimator = RBFNetwork(
-            alpha, beta, **prototypes, feature_groups=groups, reach=selection.reach
-        )
-        estimator.fit(features, data.layers, data.sequences, persons=persons)
+    estimator = selection.estimator(kind, groups)
+    curve = cross_validate(
+        estimator,
+        features,
+        target_gram(data.layers, weights),
+        weights.sum(),
+        data.sequences,
+        clips,
+        **selection.grid(kind),
+        n_folds=selection.folds,
+        persons=persons,
+    )
+    row, column = curve.choose(selection.choice)
+    estimator.set_params(alpha=float(curve.alphas[column]))
+    if not np.isnan(curve.betas[row]):
+        estimator.set_params(beta=float(curve.betas[row]))
+    estimator.fit(features, data.layers, data.sequences, persons)
+    novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
     used = {
         take: data.frames[data.sequences == k]
         for k, take in enumerate(data.takes)
@@ -162,6 +187,7 @@ def train(
         topology=topology,
         training_frames=used,
         neutrals_mm=data.neutrals_mm if persons is not None else {},
+        novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
     )
     return model, curve
 

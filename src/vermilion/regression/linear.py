@@ -1,0 +1,207 @@
+"""What all regressors share: scaled features, a design matrix, ridge weights, a basis of layers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from scipy import linalg
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted
+
+from vermilion.regression.ridge import person_averages, ridge_weights
+from vermilion.regression.scaling import feature_range, feature_scale, trust
+
+
+class LinearOutputs(RegressorMixin, BaseEstimator):
+    """Linear outputs of a design matrix, which a subclass makes of the features.
+
+    Args:
+        alpha: ridge parameter of the weights; the bias is not penalised.
+        feature_groups: labels of the features that share a scale, or None.
+        reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
+        fade: how far further half of the prediction is left (`scaling.trust`).
+        basis_error: how much the basis may change a prediction (`layer_basis`); 0 for nothing.
+
+    Attributes (fitted): `coefficients_` (P, R) and `basis_` (R, K), whose product are the weights,
+    `person_biases_` (G, K), `bias_` (K,) of anybody else, `mean_activation_` (P,),
+    `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
+    """
+
+    #: Fitted arrays, by the names that they have in a model file with an underscore.
+    FITTED: tuple[str, ...] = (
+        "coefficients_",
+        "basis_",
+        "bias_",
+        "person_biases_",
+        "feature_mean_",
+        "feature_scale_",
+        "feature_low_",
+        "feature_high_",
+        "mean_activation_",
+    )
+
+    def __init__(
+        self,
+        alpha: float = 1.0,
+        feature_groups: Sequence[str] | None = None,
+        reach: float = np.inf,
+        fade: float = 2.0,
+        basis_error: float = 0.0,
+    ):
+        self.alpha = alpha
+        self.feature_groups = feature_groups
+        self.reach = reach
+        self.fade = fade
+        self.basis_error = basis_error
+
+    def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None, **chosen) -> None:
+        """Fit what the design needs to know of the scaled features (F, M)."""
+
+    def _design(self, scaled: np.ndarray) -> np.ndarray:
+        """Design matrix (F, P) of scaled features (F, M)."""
+        return scaled
+
+    def novelty(self, features: np.ndarray) -> np.ndarray:
+        """How far features (F, M) lie from those of the training, (F,)."""
+        raise NotImplementedError
+
+    def fit(
+        self,
+        features: np.ndarray,
+        targets: np.ndarray,
+        sequences: np.ndarray | None = None,
+        persons: np.ndarray | None = None,
+        **chosen,
+    ) -> Self:
+        """Fit on features (F, M) and targets (F, K).
+
+        Args:
+            sequences: (F,) labels of the sequences, frames in order of time; one if None.
+            persons: (F,) in 0 .. G - 1, each person starting at their neutral: a bias for each. None:
+                the paper's single bias.
+            chosen: what the subclass lets the caller choose (`fit_inputs`).
+        """
+        if targets.ndim != 2 or len(features) != len(targets):
+            raise ValueError(
+                "features and targets must be (F, M) and (F, K), "
+                f"got {np.shape(features)} and {targets.shape}"
+            )
+        design = self.fit_inputs(features, sequences, **chosen)
+        labels = np.zeros(len(design), dtype=np.int64) if persons is None else persons
+        weights, biases = ridge_weights(design, targets, self.alpha, persons=labels)
+        self.coefficients_, self.basis_ = layer_basis(design, weights, self.alpha, self.basis_error)
+        # The mean of each person's frames is kept by the bias, whatever the basis leaves out.
+        means = person_averages(labels) @ design
+        biases = biases + means @ weights - (means @ self.coefficients_) @ self.basis_
+        self.person_biases_ = biases.astype(weights.dtype)
+        self.bias_ = self.person_biases_[0]
+        if persons is not None:
+            first = np.unique(persons, return_index=True)[1]
+            neutral = (design[first].mean(axis=0) @ self.coefficients_) @ self.basis_
+            self.bias_ = bias_of_a_stranger(biases, neutral).astype(weights.dtype)
+        return self
+
+    def fit_inputs(
+        self, features: np.ndarray, sequences: np.ndarray | None = None, **chosen
+    ) -> np.ndarray:
+        """Fit all but the weights on features (F, M): enough for `novelty`. Returns the design."""
+        features = np.asarray(features, dtype=np.float64)
+        if features.ndim != 2:
+            raise ValueError(f"features must be (F, M), got {features.shape}")
+        self.n_features_in_ = features.shape[1]
+        self.feature_mean_, self.feature_scale_ = feature_scale(features, self.feature_groups)
+        scaled = self.scaled(features)
+        self.feature_low_, self.feature_high_ = feature_range(scaled, self.reach)
+        self._choose(scaled, sequences, **chosen)
+        design = self._design(scaled)
+        self.mean_activation_ = design.mean(axis=0)
+        return design
+
+    def scaled(self, features: np.ndarray) -> np.ndarray:
+        """Features (F, M) in the estimator's own scale, float64."""
+        check_is_fitted(self, "feature_scale_")
+        features = np.asarray(features, dtype=np.float64)
+        if features.ndim != 2 or features.shape[1] != self.n_features_in_:
+            raise ValueError(f"features must be (F, {self.n_features_in_}), got {features.shape}")
+        return (features - self.feature_mean_) / self.feature_scale_
+
+    def activations(self, features: np.ndarray) -> np.ndarray:
+        """Design matrix (F, P) of features (F, M), drawn to its mean beyond the reach."""
+        scaled = self.scaled(features)
+        held = np.clip(scaled, self.feature_low_, self.feature_high_)
+        added = self._design(held) - self.mean_activation_
+        return self.mean_activation_ + trust(scaled, held, self.fade) * added
+
+    def mixture(self, features: np.ndarray) -> np.ndarray:
+        """Coefficients (F, R) of the basis, in its precision."""
+        return (self.activations(features) @ self.coefficients_).astype(self.basis_.dtype)
+
+    def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
+        """Outputs (F, K), in the precision of the weights; `person` as labelled in `fit`."""
+        return self.mixture(features) @ self.basis_ + self.bias_of(person)
+
+    def bias_of(self, person: int | None) -> np.ndarray:
+        """(K,) of a person of the training, or of anybody else (None)."""
+        return self.bias_ if person is None else self.person_biases_[person]
+
+    @property
+    def weights_(self) -> np.ndarray:
+        """Weights (P, K) of the design."""
+        return self.coefficients_ @ self.basis_
+
+
+def layer_basis(
+    design: np.ndarray, weights: np.ndarray, alpha: float, allowed: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (P, R) float64 and basis (R, K) with as few rows as `allowed`.
+
+    The principal components of what is predicted: their product differs from the weights by that
+    which changes predictions least. What the design may be is taken to have the second moment
+    Phi' Phi + alpha of the centred training and of the ridge's prior.
+
+    Args:
+        design: (F, P); weights: (P, K).
+        alpha: ridge parameter.
+        allowed: root mean square of the change over that of the predictions about their mean.
+    """
+    n_rows = weights.shape[0]
+    if allowed <= 0:
+        return np.eye(n_rows), weights
+    centred = design - design.mean(axis=0)
+    values, vectors = linalg.eigh(centred.T @ centred)
+    size = np.sqrt(np.maximum(values, 0.0) + alpha)
+    gram = np.zeros((n_rows, n_rows))
+    for first in range(0, weights.shape[1], 16384):
+        part = weights[:, first : first + 16384]
+        gram += part @ part.T
+    # In the scaled eigenbasis the change of the weights is the change of what is predicted.
+    rotated = (vectors * size).T
+    energy, components = linalg.eigh(rotated @ gram @ rotated.T)
+    energy, components = np.maximum(energy[::-1], 0.0), components[:, ::-1]
+    left_out = energy.sum() - np.cumsum(energy)
+    rank = min(int((left_out > allowed**2 * energy.sum()).sum()) + 1, n_rows)
+    chosen = components[:, :rank]
+    basis = (chosen.T @ rotated).astype(weights.dtype) @ weights
+    return (vectors / size) @ chosen, basis
+
+
+def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """Bias (K,) for a person whom the training has not seen.
+
+    The layer at the neutral is identity. A stranger's is expected to be the mean of those seen,
+    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people, and one
+    half where there is but one.
+
+    Args:
+        biases: (G, K) of the people seen.
+        neutral: (K,) weighted activations at the neutral, so that bias + neutral is its layer.
+    """
+    identity = biases + neutral
+    mean, n_persons = identity.mean(axis=0), len(biases)
+    worth = 0.5
+    if n_persons > 1:
+        spread = identity.var(axis=0, ddof=1).mean() / n_persons
+        worth = float(np.clip(1.0 - spread / max(float((mean**2).mean()), 1e-300), 0.0, 1.0))
+    return worth * mean - neutral
