@@ -1,5 +1,7 @@
 """Deformation gradients and their nine numbers, as maths."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,6 +11,7 @@ from vermilion.correction.gradients import (
     deformation_gradients,
     triangle_frames,
 )
+from vermilion.correction.head import world_from_head
 from vermilion.correction.layers import (
     correction_layers,
     decode_layers,
@@ -16,6 +19,7 @@ from vermilion.correction.layers import (
     polar_decomposition,
 )
 from vermilion.correction.rotations import rotation_matrix, rotation_vector
+from vermilion.correction.take_layers import take_layers
 
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
 
@@ -41,6 +45,34 @@ def test_rigid_motion_gives_rotation_alone(vertices):
     np.testing.assert_allclose(layers[:, :3], [[0.4, -1.1, 0.3]] * 3, atol=1e-12)
 
 
+@pytest.mark.parametrize("head", ["frame", "neutral"])
+def test_rigid_motion_of_the_head_gives_the_zero_layer(vertices, head):
+    """H is C seen by another tracker: each frame of either has a rigid motion of its own."""
+    n_frames = 4
+    rng = np.random.default_rng(11)
+    rotation = Rotation.from_rotvec(rng.normal(scale=0.8, size=(n_frames, 3))).as_matrix()
+    translation = rng.normal(scale=200.0, size=(n_frames, 3))
+    shape = vertices + rng.normal(scale=4.0, size=(n_frames, *vertices.shape))
+    shape[0] = vertices
+    shape[:, :4] = vertices[:4]  # the part that does not move with expression
+    coarse = world_from_head(shape, rotation, translation)
+    other = Rotation.from_rotvec(rng.normal(size=(n_frames, 3))).as_matrix()
+    accurate = coarse @ np.swapaxes(other, 1, 2) + rng.normal(scale=90.0, size=(n_frames, 1, 3))
+    correspondence = SimpleNamespace(
+        on_coarse=lambda meshes: meshes,
+        rigid=np.arange(5) < 4,
+        coarse_triangles=TRIANGLES,
+        coarse_neutral_mm=vertices,
+        mask=np.arange(3),
+    )
+    made = take_layers(
+        correspondence, accurate, coarse, rotation, translation,
+        head=head, accurate_neutral_mm=accurate[0],
+    )  # fmt: skip
+    assert made.valid.all()
+    np.testing.assert_allclose(made.layers, 0.0, atol=1e-9)
+
+
 def test_no_difference_gives_the_zero_layer(vertices):
     np.testing.assert_allclose(
         correction_layers(vertices[None], vertices[None], TRIANGLES), 0.0, atol=1e-13
@@ -50,6 +82,22 @@ def test_no_difference_gives_the_zero_layer(vertices):
 def test_uniform_scale_is_recovered_in_all_directions(vertices):
     layers = correction_layers(vertices[None], 1.3 * vertices[None], TRIANGLES)[0]
     np.testing.assert_allclose(layers, [[0, 0, 0, 0.3, 0.3, 0.3, 0, 0, 0]] * 3, atol=1e-12)
+
+
+def test_known_affine_map_is_recovered_exactly():
+    """In all nine entries, where it takes the normal of a plane as the phantom vertex goes: by the
+    root of the area's growth."""
+    plane = Rotation.from_rotvec([0.7, -0.2, 1.9]).as_matrix()
+    tangential = np.array([[1.4, 0.3], [-0.5, 0.8]])
+    local = np.eye(3)
+    local[:2, :2] = tangential
+    local[2, 2] = np.sqrt(np.linalg.det(tangential))
+    affine = Rotation.from_rotvec([-2.1, 0.4, 0.3]).as_matrix() @ plane @ local @ plane.T
+    flat = np.random.default_rng(5).normal(scale=20.0, size=(5, 3)) * [1, 1, 0]
+    vertices = flat @ plane.T + [4.0, 5.0, 6.0]
+    gradients = deformation_gradients(vertices, vertices @ affine.T + 7.0, TRIANGLES)
+    np.testing.assert_allclose(gradients, [affine] * 3, atol=1e-12)
+    np.testing.assert_allclose(decode_layers(encode_gradients(gradients)), [affine] * 3, atol=1e-12)
 
 
 def test_affine_map_acts_on_the_triangles_edges(vertices):
@@ -82,6 +130,19 @@ def test_triangle_without_area_gets_the_identity():
 @pytest.mark.parametrize("spread", [1e-9, 0.1, 0.5, 3.0])
 def test_nine_numbers_round_trip(spread):
     gradients = np.eye(3) + spread * np.random.default_rng(1).normal(size=(5000, 3, 3))
+    np.testing.assert_allclose(
+        decode_layers(encode_gradients(gradients)), gradients, atol=1e-9, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-8, 1e-4, 1.0, np.pi - 1e-4, np.pi - 1e-9, np.pi])
+def test_nine_numbers_round_trip_at_small_turns_and_near_half_a_turn(angle):
+    rng = np.random.default_rng(7)
+    axes = rng.normal(size=(500, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    roots = np.eye(3) + 0.3 * rng.normal(size=(500, 3, 3))
+    stretches = roots @ np.swapaxes(roots, 1, 2)
+    gradients = Rotation.from_rotvec(angle * axes).as_matrix() @ stretches
     np.testing.assert_allclose(
         decode_layers(encode_gradients(gradients)), gradients, atol=1e-9, rtol=1e-9
     )

@@ -1,0 +1,106 @@
+"""PS, MS and GR never train on a frame that is held out, and GR on nobody that it is judged by."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vermilion.config.takes import Take
+from vermilion.correspondence.correspondence import topology_hash
+from vermilion.database.read import LipDatabase
+from vermilion.database.schema import SubjectEntry, TakeEntry
+from vermilion.database.write import write_database
+from vermilion.regression.training import Selection, train, training_subjects
+
+TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])
+NAMES = ("shape_01", "outer_width")
+
+ranges = st.tuples(st.integers(0, 11), st.integers(0, 11)).map(sorted)
+splits = st.one_of(
+    st.sampled_from(["train", "test", "none"]),
+    st.lists(ranges, min_size=1, max_size=3).map(
+        lambda found: "test:" + ",".join(f"{low}-{high}" for low, high in found)
+    ),
+)
+sheets = st.dictionaries(
+    st.tuples(st.sampled_from(["ana", "bo", "cy"]), st.sampled_from(["rom", "talk"])),
+    splits,
+    min_size=2,
+)
+
+
+def take_of(subject, name, split):
+    return Take(subject, name, "tattoo", "captures", 0, 11, 30.0, split)
+
+
+def write(path, takes):
+    """A database of the takes, each frame's first feature its number."""
+    rng = np.random.default_rng(0)
+    subjects = sorted({take.subject for take in takes})
+    neutrals = {s: rng.normal(scale=30.0, size=(4, 3)) for s in subjects}
+    entries = [
+        TakeEntry(
+            take.subject, take.take, take.fps, take.split,
+            np.arange(12), rng.normal(size=(12, 2)).astype("f4"),
+            rng.normal(size=(12, 2, 9)).astype("f4"), np.ones(12, bool),
+            np.isin(np.arange(12), take.train_frames()),
+        )
+        for take in takes
+    ]  # fmt: skip
+    people = [SubjectEntry(s, neutrals[s], np.arange(2)) for s in subjects]
+    write_database(path, TRIANGLES, NAMES, people, entries)
+
+
+def regressors_of(subjects):
+    names = ["MS", *(f"PS-{s}" for s in subjects)]
+    return names + [f"GR-{s}" for s in subjects if len(subjects) > 1]
+
+
+@settings(max_examples=25, deadline=None)
+@given(sheet=sheets)
+def test_no_regressor_trains_on_what_it_is_judged_by(sheet, tmp_path_factory):
+    takes = [take_of(*name, split) for name, split in sheet.items()]
+    path = tmp_path_factory.mktemp("split") / "lips.h5"
+    write(path, takes)
+    with LipDatabase(path) as database:
+        for name in regressors_of(database.subjects):
+            people = training_subjects(name, database.subjects)
+            wanted = {(t.name, f) for t in takes if t.subject in people for f in t.train_frames()}
+            if len(wanted) < 5:
+                continue
+            data = database.training_set(people)
+            seen = {
+                (data.takes[k], int(f)) for k, f in zip(data.sequences, data.frames, strict=True)
+            }
+            assert seen == wanted
+            for take in takes:
+                assert not seen & {(take.name, f) for f in take.test_frames()}
+            if name.startswith("GR-"):
+                judged = name.removeprefix("GR-")
+                assert not {take for take, _ in seen if take.startswith(f"{judged}/")}
+
+
+def test_a_take_held_out_whole_is_in_no_regressor(tmp_path):
+    takes = [
+        take_of("ana", "rom", "train"), take_of("ana", "talk", "test"),
+        take_of("bo", "rom", "test:3-5,9-11"),
+    ]  # fmt: skip
+    write(tmp_path / "lips.h5", takes)
+    place = (NAMES, np.arange(2), np.ones(2), topology_hash(TRIANGLES))
+    with LipDatabase(tmp_path / "lips.h5") as database:
+        for name, expected in {
+            "MS": {"ana/rom", "bo/rom"}, "PS-ana": {"ana/rom"}, "GR-ana": {"bo/rom"},
+        }.items():  # fmt: skip
+            data = database.training_set(training_subjects(name, database.subjects))
+            model, _ = train(name, data, *place, Selection(folds=2, clip_frames=2))
+            assert set(model.training_frames) == expected
+            if "bo/rom" in expected:
+                np.testing.assert_array_equal(model.training_frames["bo/rom"], [0, 1, 2, 6, 7, 8])
+
+
+@pytest.mark.parametrize("split", ["train", "test", "none", "test:0-4,8-8"])
+def test_a_frame_trains_or_is_held_out_but_never_both(split):
+    take = take_of("ana", "rom", split)
+    assert not set(take.train_frames()) & set(take.test_frames())
+    both = set(take.train_frames()) | set(take.test_frames())
+    assert both == (set() if split == "none" else set(range(12)))
