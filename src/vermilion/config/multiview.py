@@ -138,7 +138,7 @@ class TrackConfig(StageConfig):
         8.0, gt=0.1, le=100, description="Longest motion of a vertex between two frames (mm)."
     )
     anchor_similarity: float = Field(
-        0.75,
+        0.6,
         ge=0,
         le=1,
         description="Smallest correlation of an anchor frame's pictures with the neutral's.",

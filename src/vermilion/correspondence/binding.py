@@ -18,13 +18,14 @@ def bind_vertices(
     max_angle_deg: float,
     sides: np.ndarray | None = None,
     triangle_sides: np.ndarray | None = None,
-    rounds: int = 40,
+    rounds: int = 100,
 ) -> tuple[SurfaceMap, np.ndarray]:
     """Bind every vertex to its closest compatible point; folds are relaxed along the surface.
 
     The closest points of neighbours can lie in another order than the neighbours themselves, above
-    all where a lip turns inwards. The corners of such triangles slide towards the middle of their
-    neighbours' points, on the surface, until none faces the wrong way.
+    all where a lip turns inwards. The corners of such triangles, and by less the vertices about them,
+    slide towards the middle of their neighbours' points, on the surface, until none faces the wrong
+    way.
 
     Args:
         registered: near the accurate mesh.
@@ -53,16 +54,16 @@ def bind_vertices(
         folded = flipped_triangles(found, registered.triangles, accurate)
         if not folded.any():
             break
-        wrong = np.zeros(len(normals), dtype=bool)
-        wrong[registered.triangles[folded]] = True
+        pull = np.zeros(len(normals))
+        pull[registered.triangles[folded]] = 0.5
         for _ in range(1 + index // ROUNDS_A_RING):  # stubborn folds need more room
-            wrong |= near @ wrong > 0
-        moving = np.flatnonzero(wrong & found.bound)
+            pull = np.maximum(pull, 0.5 * near.multiply(pull).max(axis=1).toarray().ravel())
+        moving = np.flatnonzero((pull > 0) & found.bound)
         ring = near[moving]
         count = np.maximum(ring @ found.bound.astype(float), 1.0)
         middle = (ring @ np.nan_to_num(points)) / count[:, None]
         slid, _ = closest_on_surface(
-            0.5 * (points[moving] + middle),
+            points[moving] + pull[moving, None] * (middle - points[moving]),
             accurate,
             normals=found.sample(normals_there, accurate.triangles)[moving],
             max_angle_deg=max_angle_deg,
