@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from tests.unit.evaluation_face import mouth_triangles, sheet_face
+from vermilion.camera import look_at, pinhole
 from vermilion.evaluation.errors import ClipSums, second_differences
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
+from vermilion.evaluation.visible import cameras_that_see
 from vermilion.mesh import vertex_areas
 
 FRAMES = np.arange(10, 16)
@@ -143,11 +145,37 @@ def test_reconstruction_is_measured_without_alignment(face):
     truth = moving(model)
     reference = Reference("truth", truth, truth, model.triangles)
     shifted = truth + np.array([0.0, 0.0, 2.0])
+    upper = model.neutral_mm[:, 1] > 0
+    shifted[:, upper] += np.array([0.0, 0.0, 1.0])
     slid = np.zeros(truth.shape[:2])
-    sums = evaluate_reconstruction(shifted, FRAMES, regions, reference, slid, 2, 1)
+    seen = np.broadcast_to(upper, truth.shape[:2])
+    sums = evaluate_reconstruction(shifted, FRAMES, regions, reference, slid, seen, 2, 1)
     rows = measure_rows(sums, "s", "t", 6, 200, 0.95, 0).set_index(["measure", "region"])["value"]
-    assert rows["vertex_error_mean_mm", "face"] == pytest.approx(2.0, abs=1e-9)
-    assert rows["drift_mm", "vermilion"] == 0.0
+    assert 2.0 < rows["vertex_error_mean_mm", "vermilion"] < 3.0
+    assert rows["vertex_error_mean_mm", "visible"] == pytest.approx(3.0, abs=1e-9)
+    assert rows["drift_mm", "vermilion"] == rows["drift_mm", "visible"] == 0.0
+
+
+def test_a_point_is_seen_by_the_cameras_that_nothing_hides_it_from(face):
+    model, _ = face
+    truth = model.neutral_mm[None]
+    reference = Reference("truth", truth, truth, model.triangles)
+    place = np.array([[0.0, 0.0, 500.0], [0.0, 0.0, -500.0]])  # before the face, behind it
+    up = np.array([0.0, 1.0, 0.0])
+    rig = [
+        pinhole(str(i), 800.0, 400, 400, look_at(at, np.zeros(3), up)) for i, at in enumerate(place)
+    ]
+    wanted = model.regions["vermilion_upper"]
+    seen = cameras_that_see(reference, [*rig, rig[0]], wanted)
+    assert (seen[0, ~wanted] == 0).all()
+    # from behind the sheet nothing hides its points either: it has no thickness
+    assert (seen[0, wanted] == 3).mean() > 0.9
+    wall = np.array([[-90.0, -90, 60], [90, -90, 60], [0, 90, 60]])
+    hidden = Reference(
+        "truth", truth, np.concatenate([truth[0], wall])[None],
+        np.concatenate([model.triangles, [[len(truth[0]) + k for k in range(3)]]]),
+    )  # fmt: skip
+    assert (cameras_that_see(hidden, rig, wanted)[0, wanted] <= 1).all()
 
 
 def test_joined_takes_weigh_by_their_area_and_frames():

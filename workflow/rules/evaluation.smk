@@ -122,6 +122,7 @@ rule evaluate_reconstruction:
     input:
         template=R + "/face/template.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
+        cameras=R + "/takes/{subject}/{take}/cameras",
         accurate=per_chunk(R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"),
         truth=lambda wildcards: truth_files(wildcards.subject, wildcards.take),
     output:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vermilion.camera import read_cameras
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.closest import Surface
@@ -10,6 +11,7 @@ from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
 from vermilion.evaluation.take import evaluate_reconstruction
+from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
 from vermilion.mesh import vertex_normals
@@ -50,8 +52,10 @@ def main(snakemake):
     )  # fmt: skip
     regions = regions_of_mask(template, sequence[0], mouth)
     slid = drift(sequence, triangles, reference, regions.used & reference.valid, cosine)
+    cameras = read_cameras(inputs.cameras).values()
+    seen = cameras_that_see(reference, cameras, regions.weights["vermilion"] > 0) >= 2
     sums = evaluate_reconstruction(
-        sequence, frames, regions, reference, slid, options.clip_frames, options.min_clips
+        sequence, frames, regions, reference, slid, seen, options.clip_frames, options.min_clips
     )
     save_sums(snakemake.output.sums, sums, len(frames))
     table = measure_rows(

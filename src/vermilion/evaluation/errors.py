@@ -122,6 +122,15 @@ def sums_of_jitter(
     return ClipSums(sums)
 
 
+def sums_of_drift(drift_mm: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
+    """Sums behind `drift_mm`, of (F, V) mm; NaN does not count."""
+    sums = {}
+    for region, weights in regions.weights.items():
+        weight, total = _weighted_sums(drift_mm, weights, clips)
+        sums[f"{region}.drift_weight"], sums[f"{region}.drift"] = weight, total
+    return ClipSums(sums)
+
+
 def sums_of_aperture(
     result_gaps: np.ndarray,
     reference_gaps: np.ndarray,

@@ -10,7 +10,8 @@ from vermilion.evaluation.closest import Surface
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import vertex_areas
 
-REGION_NAMES = ("vermilion", "mouth", "face")
+#: `visible` is the part of the vermilion that two cameras see in the frame; of **H** alone.
+REGION_NAMES = ("vermilion", "visible", "mouth", "face")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from vermilion.evaluation.errors import (
     by_clip,
     gaps_in_head,
     sums_of_aperture,
+    sums_of_drift,
     sums_of_errors,
     sums_of_jitter,
     surface_errors,
@@ -104,6 +105,7 @@ def evaluate_reconstruction(
     regions: Regions,
     reference: Reference,
     drift_mm: np.ndarray,
+    seen: np.ndarray,
     clip_frames: int,
     min_clips: int,
 ) -> dict[str, ClipSums]:
@@ -113,23 +115,22 @@ def evaluate_reconstruction(
         sequence_mm: (F, V, 3) of H.
         reference: truth, followed from the neutral.
         drift_mm: (F, V) of `drift`.
+        seen: (F, V) bool, reference points that enough cameras see; the region `visible` is what
+            of the vermilion they show.
     """
     regions = regions.restricted(reference.valid)
     clips = clips_of(frames, clip_frames, min_clips)
     surface = surface_errors(
         {"H": sequence_mm}, reference, regions.used, lambda items: progress(items, "H")
     )["H"]
-    sums = sums_of_errors(vertex_errors(sequence_mm, reference), surface, regions, clips)
+    errors = vertex_errors(sequence_mm, reference)
+    shown = Regions({"visible": regions.weights["vermilion"]}, regions.rest, regions.lips)
+    hidden = np.where(seen, 0.0, np.nan)
+    sums = sums_of_errors(errors, surface, regions, clips)
     sums += sums_of_jitter(sequence_mm, reference, frames, regions, clips)
-    for region, weights in regions.weights.items():
-        finite = np.isfinite(drift_mm)
-        total = (np.where(finite, drift_mm, 0.0) * weights).sum(axis=1)
-        sums += ClipSums(
-            {
-                f"{region}.drift": by_clip(total, clips),
-                f"{region}.drift_weight": by_clip((finite * weights).sum(axis=1), clips),
-            }
-        )
+    sums += sums_of_drift(drift_mm, regions, clips)
+    sums += sums_of_errors(errors + hidden, surface + hidden, shown, clips)
+    sums += sums_of_drift(drift_mm + hidden, shown, clips)
     return {"H": sums}
 
 
