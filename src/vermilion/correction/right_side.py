@@ -56,16 +56,21 @@ def accumulate(corners, row, weights, points, layers, series, limits, right):
     """
     last = series.shape[1]
     flow = np.empty((2, 3, LANES), dtype=points.dtype)
+    turn, sines, cosines = np.empty((3, LANES), dtype=points.dtype)
     for t in range(corners.shape[0]):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
         layer = layers[t]
         for f in range(LANES):
             x, y, z = layer[0, f], layer[1, f], layer[2, f]
-            turn = min((x * x + y * y + z * z) * limits[0] - limits[1], limits[1])
-            sine, cosine = series[0, 0], series[1, 0]
-            for k in range(1, last):
-                sine = sine * turn + series[0, k]
-                cosine = cosine * turn + series[1, k]
+            turn[f] = min((x * x + y * y + z * z) * limits[0] - limits[1], limits[1])
+            sines[f], cosines[f] = series[0, 0], series[1, 0]
+        for k in range(1, last):
+            for f in range(LANES):
+                sines[f] = sines[f] * turn[f] + series[0, k]
+                cosines[f] = cosines[f] * turn[f] + series[1, k]
+        for f in range(LANES):
+            x, y, z = layer[0, f], layer[1, f], layer[2, f]
+            sine, cosine = sines[f], cosines[f]
             sxx, syy, szz = layer[3, f], layer[4, f], layer[5, f]
             sxy, sxz, syz = layer[6, f], layer[7, f], layer[8, f]
             for edge in range(2):
