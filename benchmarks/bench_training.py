@@ -1,6 +1,6 @@
 """Speed of training at the paper's size, against scikit-learn's grid search.
 
-    OMP_NUM_THREADS=1 python -m benchmarks.bench_training [--peer]
+    OMP_NUM_THREADS=1 python -m benchmarks.bench_training [--regressor kernel] [--peer]
 
 3,289 frames of four people, 53 features, 27,000 outputs (3,000 triangles), 25 grid points, 5 folds
 grouped by clip. Prints seconds and the largest memory. Bars: 60 s and 2 GB. With `--peer`, the time
@@ -43,12 +43,14 @@ def paper_sized_data() -> TrainingSet:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--regressor", choices=["rbf", "kernel"], default="rbf")
     parser.add_argument("--peer", action="store_true", help="time scikit-learn as well")
     arguments = parser.parse_args()
     data = paper_sized_data()
     names = [f"shape_{k}" for k in range(33)] + [f"outer_{k}" for k in range(20)]
+    alphas, betas = (1e-3, 1e-2, 1e-1, 1.0, 10.0), (0.03, 0.1, 0.3, 1.0, 3.0)
     selection = Selection(
-        alphas=(1e-3, 1e-2, 1e-1, 1.0, 10.0), betas=(0.03, 0.1, 0.3, 1.0, 3.0), folds=5
+        arguments.regressor, alphas=alphas, betas=betas, kernel_alphas=alphas, kernel_betas=betas
     )
     start = time.perf_counter()
     model, curve = train(
@@ -57,12 +59,13 @@ def main() -> None:
     seconds = time.perf_counter() - start
     memory_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(f"{curve.mean.size} grid points, {len(curve.frames)} folds, ", end="")
-    print(f"{len(model.estimator.prototypes_)} prototypes")
+    activations, rank = model.estimator.coefficients_.shape
+    print(f"{activations} activations, a basis of {rank} layers")
     print(f"training          {seconds:8.1f} s (bar 60)")
     print(f"largest memory    {memory_gb:8.2f} GB with the data (bar 2)")
     if arguments.peer:
-        clips = clips_of(data.sequences, selection.clip_frames, 5)
-        rows, held = next(GroupKFold(5).split(clips, groups=clips))
+        clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
+        rows, held = next(GroupKFold(selection.folds).split(clips, groups=clips))
         start = time.perf_counter()
         peer = KernelRidge(alpha=0.1, kernel="rbf", gamma=0.002)
         peer.fit(data.features[rows], data.layers[rows]).score(

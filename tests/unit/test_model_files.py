@@ -236,7 +236,7 @@ def test_training_chooses_writes_and_reads(database, tmp_path):
     with LipDatabase(database) as read:
         data = read.training_set(["ana", "bo"])
         place = (read.feature_names, read.mask, read.area_mm2, read.topology)
-    for name in ("MS", "MS-affine", "MS-kernel", "MS-shape-only", "MS-distances-only"):
+    for name in ("MS", "MS-affine", "MS-rbf", "MS-shape-only", "MS-distances-only"):
         trained, curve = train(name, data, *place, Selection(folds=3, clip_frames=6))
         save_model(tmp_path / f"{name}.h5", trained)
         read = load_model(tmp_path / f"{name}.h5")

@@ -143,6 +143,17 @@ def test_a_group_keeps_its_proportions_and_weighs_as_much_as_any_other(data):
     assert variance[:3].sum() == pytest.approx(variance[3:].sum())
 
 
+@pytest.mark.parametrize("equalise", [0.0, 0.5, 1.0])
+def test_equalise_takes_the_root_of_the_ratio_of_deviations(data, equalise):
+    features, _ = data
+    features = features / features.std(axis=0) * [1, 10, 100, 1, 1, 1, 1]
+    mean, scale = feature_scale(features, ["a", "a", "a", "b", "b", "b", "b"], equalise)
+    deviation = ((features - mean) / scale).std(axis=0)
+    np.testing.assert_allclose(deviation[1] / deviation[0], 10 ** (1 - equalise))
+    np.testing.assert_allclose(deviation[2] / deviation[0], 100 ** (1 - equalise))
+    assert (deviation**2).sum() == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize("kind", [RBFNetwork, AffineRegressor, KernelRegressor])
 def test_beyond_the_reach_the_prediction_is_drawn_to_the_mean(data, kind):
     features, targets = data
@@ -206,10 +217,12 @@ def test_held_out_clips_are_more_novel_than_frames_trained_on(data, kind):
 def test_a_constant_feature_says_nothing(data):
     features, targets = data
     features = np.column_stack([features, np.full(120, 5.0)])
-    network = RBFNetwork().fit(features, targets)
     changed = features.copy()
     changed[:, -1] = 1e6
-    np.testing.assert_array_equal(network.predict(changed), network.predict(features))
+    for groups in (None, ["a"] * 8):
+        for kind in (RBFNetwork, KernelRegressor):
+            fitted = kind(feature_groups=groups).fit(features, targets)
+            np.testing.assert_array_equal(fitted.predict(changed), fitted.predict(features))
 
 
 def test_prototypes_are_every_tenth_frame_of_each_sequence():

@@ -15,9 +15,9 @@ class TrainingConfig(StageConfig):
     """Regressors from features to correction layers (Lips16 5.2)."""
 
     regressor: Literal["rbf", "affine", "kernel"] = Field(
-        "rbf",
-        description="Estimator of PS, MS and GR. `rbf`: the paper's network. `affine`: its simple "
-        "alternative. `kernel`: kernel ridge regression on all frames, with a predictive variance. "
+        "kernel",
+        description="Estimator of PS, MS and GR. `kernel`: kernel ridge regression on all frames, with "
+        "a predictive variance. `rbf`: the paper's network. `affine`: its simple alternative. "
         "The others can be evaluated beside it (`evaluation.variants`).",
     )
     prototype_stride: int = Field(
@@ -52,19 +52,26 @@ class TrainingConfig(StageConfig):
         description="Tikhonov parameters of the affine regressor that cross-validation tries.",
     )
     kernel_alphas: list[Positive] = Field(
-        [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0],
+        [1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0],
         min_length=1,
         description="Noise variances of the kernel regressor that cross-validation tries.",
     )
     kernel_betas: list[Positive] = Field(
-        [0.01, 0.03, 0.1, 0.3, 1.0],
+        [0.1, 0.3, 1.0, 3.0],
         min_length=1,
-        description="Scales of the kernel regressor's Gaussians that cross-validation tries.",
+        description="Scales of the kernel regressor's bumps that cross-validation tries.",
     )
     kernel_linear: float = Field(
         1.0,
         ge=0.0,
         description="Variance of the kernel regressor's linear part beside that of the smooth one.",
+    )
+    kernel_equalise: float = Field(
+        0.5,
+        ge=0.0,
+        le=1.0,
+        description="With `scaling: group`, how far the kernel regressor brings the features of a "
+        "group to one variance: 0 keeps their proportions, 1 makes them equal.",
     )
     folds: int = Field(5, ge=2, le=50, description="Folds of the cross-validation.")
     clip_frames: int = Field(

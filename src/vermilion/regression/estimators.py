@@ -32,9 +32,10 @@ class RBFNetwork(LinearOutputs):
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
         fade: float = 2.0,
+        equalise: float = 0.0,
         basis_error: float = 0.0,
     ):
-        super().__init__(alpha, feature_groups, reach, fade, basis_error)
+        super().__init__(alpha, feature_groups, reach, fade, equalise, basis_error)
         self.beta = beta
         self.prototype_stride = prototype_stride
         self.prototype_minimum = prototype_minimum

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import linalg
@@ -10,24 +10,28 @@ from scipy.spatial.distance import cdist
 
 from vermilion.regression.linear import LinearOutputs
 
+#: Rows whose columns are made together, and how small a rest they may go down to, of the largest.
+_PANEL, _FAIR = 48, 0.3
+
 
 class KernelRegressor(LinearOutputs):
-    """Ridge regression in the space of the kernel k(f, g) = exp(-beta |f - g|^2) + linear <f, g>.
+    """Ridge regression in the space of the kernel k(f, g) = (1 + 2 beta |f - g|^2)^-1/2 + linear <f, g>.
 
-    Where `RBFNetwork` has Gaussians at every tenth frame and penalises their weights, this has one at
-    every frame and penalises the norm of the function that they add up to, which has the same meaning
-    however close the frames lie. The linear part carries on where the Gaussians end. In terms of
-    Gaussian processes: the posterior mean of a smooth function plus an affine one, under noise of
-    variance alpha.
+    Where `RBFNetwork` has Gaussians at every tenth frame and penalises their weights, this has a bump
+    at every frame and penalises the norm of the function that they add up to, which has the same
+    meaning however close the frames lie. The bump is a rational quadratic: Gaussians of all widths
+    (Rasmussen and Williams 2006, 4.2), so that fine detail and long range do not exclude each other.
+    The linear part carries on where they end. In terms of Gaussian processes: the posterior mean of a
+    smooth function plus an affine one, under noise of variance alpha.
 
     The kernel matrix of the F frames is never formed: its pivoted Cholesky factor (Fine and Scheinberg
     2001) takes the frames that are least explained by those before, until no frame's rest is above
     `tolerance`; then the columns of the factor are the design.
 
     Args (others: `LinearOutputs`):
-        beta: scale of the Gaussians, per squared distance of scaled features (`scaling`).
+        beta: scale of the bumps, per squared distance of scaled features (`scaling`).
         linear: variance of the linear part beside that of the smooth one.
-        tolerance: rest of the kernel's diagonal that is let go, of 1 + linear.
+        tolerance: rest of the kernel's diagonal that is let go, of its mean.
         max_pivots: at most so many pivots.
 
     Attributes (fitted): `pivots_` (P, M) scaled; `whitening_` (P, P) from kernel values at the pivots
@@ -38,17 +42,18 @@ class KernelRegressor(LinearOutputs):
 
     def __init__(
         self,
-        alpha: float = 0.01,
-        beta: float = 0.1,
+        alpha: float = 0.1,
+        beta: float = 1.0,
         linear: float = 1.0,
         tolerance: float = 1e-5,
-        max_pivots: int = 800,
+        max_pivots: int = 400,
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
         fade: float = 2.0,
+        equalise: float = 0.5,
         basis_error: float = 0.0,
     ):
-        super().__init__(alpha, feature_groups, reach, fade, basis_error)
+        super().__init__(alpha, feature_groups, reach, fade, equalise, basis_error)
         self.beta = beta
         self.linear = linear
         self.tolerance = tolerance
@@ -56,7 +61,7 @@ class KernelRegressor(LinearOutputs):
 
     def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None) -> None:
         rows, factor = pivoted_cholesky(
-            lambda index: self.kernel(scaled, scaled[[index]])[:, 0],
+            lambda rows: self.kernel(scaled, scaled[rows]),
             self._diagonal(scaled),
             self.tolerance,
             self.max_pivots,
@@ -75,7 +80,7 @@ class KernelRegressor(LinearOutputs):
 
     def kernel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """k (F, G) between scaled features (F, M) and (G, M)."""
-        smooth = np.exp(-self.beta * cdist(first, second, "sqeuclidean"))
+        smooth = 1.0 / np.sqrt(1.0 + 2.0 * self.beta * cdist(first, second, "sqeuclidean"))
         return smooth + self.linear * (first @ second.T)
 
     def _diagonal(self, scaled: np.ndarray) -> np.ndarray:
@@ -94,29 +99,40 @@ class KernelRegressor(LinearOutputs):
 
 
 def pivoted_cholesky(
-    column, diagonal: np.ndarray, tolerance: float, max_rank: int
+    columns: Callable[[np.ndarray], np.ndarray],
+    diagonal: np.ndarray,
+    tolerance: float,
+    max_rank: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (P,) and factor (F, P) with K = factor factor' up to a diagonal rest under `tolerance`.
 
+    Pivots are taken from panels of the rows with the largest rest, as long as that is a fair share of
+    the largest of all: then most of the work is products of matrices.
+
     Args:
-        column: index -> column (F,) of the positive semi-definite K.
+        columns: rows (n,) -> those columns (F, n) of the positive semi-definite K.
         diagonal: (F,) of K.
         tolerance: as a share of the mean of the diagonal.
         max_rank: P at most.
     """
-    rest = diagonal.astype(np.float64).copy()
+    rest = diagonal.astype(np.float64)
     limit = tolerance * rest.mean()
-    rank = min(max_rank, len(rest))
-    factor = np.zeros((len(rest), rank), order="F")
-    rows = []
-    for k in range(rank):
-        pivot = int(rest.argmax())
-        if rest[pivot] <= limit:
-            break
-        # The rest at a pivot is zero from then on: no row is taken twice.
-        value = column(pivot) - factor[:, :k] @ factor[pivot, :k]
-        factor[:, k] = value / np.sqrt(rest[pivot])
-        rest -= factor[:, k] ** 2
-        rest[pivot] = 0.0
-        rows.append(pivot)
+    factor = np.empty((len(rest), min(max_rank, len(rest))), order="F")
+    rows: list[int] = []
+    while len(rows) < factor.shape[1] and rest.max() > limit:
+        done = len(rows)
+        candidates = np.argsort(-rest, kind="stable")[:_PANEL]
+        enough = max(_FAIR * rest[candidates[0]], limit)
+        panel = columns(candidates) - factor[:, :done] @ factor[candidates, :done].T
+        while len(rows) < factor.shape[1]:
+            best = int(rest[candidates].argmax())
+            pivot = int(candidates[best])
+            if rest[pivot] <= enough:
+                break
+            made = factor[:, done : len(rows)]
+            column = (panel[:, best] - made @ made[pivot]) / np.sqrt(rest[pivot])
+            rest -= column**2
+            rest[pivot] = 0.0  # no row is taken twice
+            factor[:, len(rows)] = column
+            rows.append(pivot)
     return np.array(rows), factor[:, : len(rows)]

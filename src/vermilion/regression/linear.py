@@ -22,6 +22,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         feature_groups: labels of the features that share a scale, or None.
         reach: how far beyond the training's range a feature counts (`scaling.feature_range`).
         fade: how far further half of the prediction is left (`scaling.trust`).
+        equalise: how far the features of a group share one variance (`scaling.feature_scale`).
         basis_error: how much the basis may change a prediction (`layer_basis`); 0 for nothing.
 
     Attributes (fitted): `coefficients_` (P, R) and `basis_` (R, K), whose product are the weights,
@@ -48,12 +49,14 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
         fade: float = 2.0,
+        equalise: float = 0.0,
         basis_error: float = 0.0,
     ):
         self.alpha = alpha
         self.feature_groups = feature_groups
         self.reach = reach
         self.fade = fade
+        self.equalise = equalise
         self.basis_error = basis_error
 
     def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None, **chosen) -> None:
@@ -111,7 +114,9 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         if features.ndim != 2:
             raise ValueError(f"features must be (F, M), got {features.shape}")
         self.n_features_in_ = features.shape[1]
-        self.feature_mean_, self.feature_scale_ = feature_scale(features, self.feature_groups)
+        self.feature_mean_, self.feature_scale_ = feature_scale(
+            features, self.feature_groups, self.equalise
+        )
         scaled = self.scaled(features)
         self.feature_low_, self.feature_high_ = feature_range(scaled, self.reach)
         self._choose(scaled, sequences, **chosen)

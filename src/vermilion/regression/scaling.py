@@ -13,7 +13,7 @@ import numpy as np
 
 
 def feature_scale(
-    features: np.ndarray, groups: Sequence[str] | None = None
+    features: np.ndarray, groups: Sequence[str] | None = None, equalise: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean (M,) and divisor (M,) of features (F, M).
 
@@ -22,6 +22,8 @@ def feature_scale(
         groups: M labels; the features of a group share one divisor, so that their own proportions
             last (principal components keep their variances), and every group has the same total
             variance. None: every feature is a group.
+        equalise: how far the features of a group are brought to one variance: 0 keeps their
+            proportions, 1 makes them equal, 1/2 lies between in the ratio of deviations.
 
     A feature that never changes gets the divisor of infinity: it tells nothing, and a new value of
     it must not either.
@@ -30,11 +32,11 @@ def feature_scale(
     mean, variance = features.mean(axis=0), features.var(axis=0)
     labels = np.arange(features.shape[1]) if groups is None else np.asarray(groups)
     _, group = np.unique(labels, return_inverse=True)
-    total = np.bincount(group, weights=variance)
-    constant = total <= 1e-24 * max(1.0, float(np.abs(mean).max(initial=0.0)) ** 2)
-    n_groups = max(int((~constant).sum()), 1)
-    divisor = np.sqrt(np.where(constant, np.inf, total) * n_groups)
-    return mean, divisor[group]
+    constant = variance <= 1e-24 * max(1.0, float(np.abs(mean).max(initial=0.0)) ** 2)
+    own = np.where(constant, 1.0, variance) ** (equalise / 2)
+    total = np.bincount(group, weights=np.where(constant, 0.0, variance / own**2))
+    divisor = own * np.sqrt(total * max(int((total > 0).sum()), 1))[group]
+    return mean, np.where(constant, np.inf, divisor)
 
 
 def feature_range(scaled: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:

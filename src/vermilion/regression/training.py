@@ -41,16 +41,17 @@ VARIANTS: dict[str, tuple[Kind | None, str]] = {
 class Selection:
     """How the parameters are chosen; the fields are those of the configuration's `training`."""
 
-    regressor: Kind = "rbf"
+    regressor: Kind = "kernel"
     prototype_stride: int = 10
     prototype_minimum: int = 20
     scaling: Literal["group", "feature"] = "group"
     alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
     betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
     affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
-    kernel_alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
-    kernel_betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
+    kernel_alphas: Sequence[float] = (1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
+    kernel_betas: Sequence[float] = (0.1, 0.3, 1.0, 3.0)
     kernel_linear: float = 1.0
+    kernel_equalise: float = 0.5
     folds: int = 5
     clip_frames: int = 30
     reach: float = 0.0
@@ -71,7 +72,9 @@ class Selection:
         if kind == "affine":
             return AffineRegressor(**shared)
         if kind == "kernel":
-            return KernelRegressor(linear=self.kernel_linear, **shared)
+            return KernelRegressor(
+                linear=self.kernel_linear, equalise=self.kernel_equalise, **shared
+            )
         return RBFNetwork(
             prototype_stride=self.prototype_stride,
             prototype_minimum=self.prototype_minimum,
