@@ -15,7 +15,7 @@ COLUMNS = ("subject", "take", "stage", "frame", "valid", "reason")
 
 @dataclass(frozen=True)
 class QualityRow:
-    """What one stage says of one frame.
+    """What one stage says of one frame. A valid row with a reason is a warning.
 
     `figures` are numeric columns with units in their names (`reprojection_px`).
     """
@@ -50,10 +50,10 @@ def write_quality(
 
 
 def flagged_frames(paths: Iterable[str | Path]) -> pd.DataFrame:
-    """The invalid rows of many quality files, in order, with the common columns only."""
+    """Rows of many quality files that are invalid or warn, in order, the common columns only."""
     tables = [read_table(path, COLUMNS)[list(COLUMNS)] for path in paths]
     if not tables:
         return pd.DataFrame(columns=list(COLUMNS))
     table = pd.concat(tables, ignore_index=True)
-    flagged = table[table["valid"] == 0]
+    flagged = table[(table["valid"] == 0) | table["reason"].notna()]
     return flagged.sort_values(["subject", "take", "stage", "frame"], ignore_index=True)

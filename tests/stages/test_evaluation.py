@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -244,6 +245,7 @@ def write_page(root, ev):
                 "training": ["MS"],
                 "overlays": [["tracking", "ana/rom"]],
                 "videos": [],
+                "timelines": [],
             },
             "frames": [
                 {
@@ -265,6 +267,7 @@ def write_page(root, ev):
             "training": [root / "models/MS.cv.png"],
             "overlays": [overlay],
             "videos": [],
+            "timelines": [],
         },
         output={"page": ev / "summary.html"},
     )
@@ -332,23 +335,27 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
     save_arrays(out / "fit.npz", {k: v[:12] if k in per_frame else v for k, v in fit.items()})
     run_script(
         "apply_export",
+        wildcards={"subject": SUBJECT, "take": "rom"},
         params={"cfg": CFG, "fps": 25.0},
         input={
             "tracker": scene.root / "face/tracker.npz",
             "fit": out / "fit.npz",
             "corrected": [tmp_path / f"parts/{part}.npy" for part in parts],
             "overlays": [tmp_path / f"parts/{part}.mp4" for part in parts],
+            "quality": [tmp_path / f"parts/{part}.tsv" for part in parts],
         },
         output={
             name: out / file
             for name, file in {
                 "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
                 "overlay": "overlay.mp4", "usd": "corrected.usdc", "obj": "obj",
+                "timeline": "timeline.png",
             }.items()
         },
     )  # fmt: skip
     assert VideoReader(out / "overlay.mp4").n_frames == 12
     assert len(pd.read_csv(out / "weights.csv")) == 12
+    assert cv2.imread(str(out / "timeline.png")).shape[1] > 500
     assert (out / "corrected.usdc").stat().st_size > 1000
     assert len(list((out / "obj").glob("*.obj"))) == 12
     mesh = read_mesh(out / "obj/000003.obj")

@@ -67,19 +67,18 @@ def test_table_names_its_missing_column(tmp_path):
         read_table(tmp_path / "t.tsv", ["b_px"])
 
 
-def test_flagged_frames_carry_their_reason(tmp_path):
-    rows = [QualityRow(0, figures={"error_px": 1.0}), QualityRow(1, False, "no face found")]
+def test_flagged_frames_and_warnings_carry_their_reason(tmp_path):
+    rows = [
+        QualityRow(0, figures={"error_px": 1.0}),
+        QualityRow(1, False, "no face found"),
+        QualityRow(2, True, "hard to see"),
+    ]
     write_quality(tmp_path / "q.tsv", "anna", "rom", "landmarks", rows)
     flagged = flagged_frames([tmp_path / "q.tsv"])
+    place = {"subject": "anna", "take": "rom", "stage": "landmarks"}
     assert flagged.to_dict("records") == [
-        {
-            "subject": "anna",
-            "take": "rom",
-            "stage": "landmarks",
-            "frame": 1,
-            "valid": 0,
-            "reason": "no face found",
-        }
+        {**place, "frame": 1, "valid": 0, "reason": "no face found"},
+        {**place, "frame": 2, "valid": 1, "reason": "hard to see"},
     ]
 
 

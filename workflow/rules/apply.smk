@@ -20,6 +20,12 @@ def apply_exports():
             labels={"take": "{subject}/{take}"},
             caption="../report/overlay.rst",
         ),
+        "timeline": report(
+            APPLIED + "/timeline.png",
+            category="Corrected takes",
+            labels={"take": "{subject}/{take}, time line"},
+            caption="../report/timeline.rst",
+        ),
     }
     if CONFIG.apply.export.usd:
         outputs["usd"] = APPLIED + "/corrected.usdc"
@@ -75,6 +81,7 @@ rule apply_export:
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         corrected=per_chunk(APPLIED + "/chunks/{chunk}.npy"),
         overlays=per_chunk(APPLIED + "/chunks/{chunk}.mp4"),
+        quality=per_chunk(APPLIED + "/quality/{chunk}.tsv"),
     output:
         **apply_exports(),
     log:

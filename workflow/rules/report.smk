@@ -101,6 +101,7 @@ rule summary:
         training=[f"{R}/models/{name}.cv.png" for name in regressor_names()],
         overlays=[path for _, _, path in stage_overlays()],
         videos=[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
+        timelines=[f"{R}/apply/{name}/timeline.png" for name in applied_takes()],
     output:
         page=report(
             R + "/evaluation/summary.html",

@@ -19,12 +19,13 @@ from vermilion.video import write_video
 
 
 def quality_row(frame, tracked, has_features, figures):
-    """What a user should know of a frame."""
+    """What a user should know of a frame; one outside the training's span stays valid."""
     if not tracked:
         return QualityRow(frame, False, "not tracked: the neighbours' pose, uncorrected", figures)
     if not has_features:
         return QualityRow(frame, False, "no contour features: the base track, uncorrected", figures)
-    return QualityRow(frame, True, "", figures)
+    outside = figures["novelty"] > figures["novelty_limit"]
+    return QualityRow(frame, True, "outside the training's span" if outside else "", figures)
 
 
 def main(snakemake):
@@ -53,7 +54,11 @@ def main(snakemake):
     rows_of_quality = [
         quality_row(
             int(frame), bool(tracked[i]), bool(has_features[i]),
-            {"novelty": novelty[i], "largest_correction_mm": moved[i]},
+            {
+                "novelty": novelty[i],
+                "novelty_limit": model.novelty_limit,
+                "largest_correction_mm": moved[i],
+            },
         )
         for i, frame in enumerate(frames)
     ]  # fmt: skip

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from vermilion.config.apply import ExportConfig
 from vermilion.export.objs import write_obj
 from vermilion.export.overlay import join_videos
+from vermilion.export.timeline import draw_timeline
 from vermilion.export.usd import write_usd
 from vermilion.export.weights import write_weights
 from vermilion.faces.model import FaceModel
@@ -15,6 +17,7 @@ from vermilion.logfile import log_to
 from vermilion.mesh import Mesh
 from vermilion.progress import progress
 from vermilion.sequences import read_sequence, write_ply, write_sequence
+from vermilion.tables import read_table
 from vermilion.tracking.result import TrackedTake
 
 
@@ -27,6 +30,9 @@ def main(snakemake):
     write_ply(out.mesh, Mesh(np.asarray(corrected[0], dtype=np.float64), tracker.triangles))
     write_weights(out.weights, fit.frames, fps, fit.expression_names, fit.weights, fit.valid)
     join_videos(out.overlay, inputs.overlays)
+    quality = pd.concat([read_table(path) for path in inputs.quality], ignore_index=True)
+    title = f"{snakemake.wildcards.subject}/{snakemake.wildcards.take}"
+    draw_timeline(quality, title, out.timeline)
     if options.usd:
         write_usd(out.usd, fit.frames, corrected, tracker.triangles, fps, fit.camera, tracker.uv)
     if options.obj:

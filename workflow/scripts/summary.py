@@ -38,6 +38,7 @@ def main(snakemake):
         curve_pictures=named("training", inputs.training),
         overlays=[Overlay(*what, path) for what, path in named("overlays", inputs.overlays)],
         videos=named("videos", inputs.videos),
+        timelines=named("videos", inputs.timelines),
         frames=pd.DataFrame(snakemake.params.frames, columns=list(FRAME_COLUMNS)),
         settings=settings(cfg),
     )

@@ -36,7 +36,7 @@ class Findings:
         table1_picture: file.
         error_maps, over_time, curve_pictures: (name, file) pairs.
         overlays: pictures of the stages.
-        videos: (name, file) pairs of the corrected takes.
+        videos, timelines: (name, file) pairs of the corrected takes.
         frames: a row a take: take, role, frames, held_out, against.
         settings: (what, value) pairs for "How this was measured".
     """
@@ -50,6 +50,7 @@ class Findings:
     curve_pictures: Sequence[tuple[str, Path]]
     overlays: Sequence[Overlay]
     videos: Sequence[tuple[str, Path]]
+    timelines: Sequence[tuple[str, Path]]
     frames: pd.DataFrame
     settings: Sequence[tuple[str, str]]
 
@@ -77,6 +78,10 @@ def summary_page(found: Findings, embed_video_mb: float) -> str:
     )  # fmt: skip
 
 
+_TIMELINE_CAPTION = (
+    "{}: how far each frame lies from what the regressor was trained on, and the limit over which it "
+    "is listed below as outside the training's span; grey frames were not corrected."
+)
 _MAP_CAPTION = (
     "{}: distance of each vertex to its corresponding point, held-out frames with the largest error "
     "of the base track; grey is not measured."
@@ -152,7 +157,12 @@ def _reconstruction(measures: pd.DataFrame) -> str:
 
 def _videos(found: Findings, limit_mb: float) -> str:
     caption = "{}: original, base track, corrected; below, the mouth."
-    return "".join(page.video(path, caption.format(name), limit_mb) for name, path in found.videos)
+    videos = "".join(
+        page.video(path, caption.format(name), limit_mb) for name, path in found.videos
+    )
+    return videos + "".join(
+        page.picture(path, _TIMELINE_CAPTION.format(name)) for name, path in found.timelines
+    )
 
 
 def _flagged(found: Findings) -> str:

@@ -66,10 +66,6 @@ class RBFNetwork(LinearOutputs):
 class AffineRegressor(LinearOutputs):
     """Affine map with Tikhonov regularisation, the paper's simple alternative (section 6)."""
 
-    def novelty(self, features: np.ndarray) -> np.ndarray:
-        """Distance to the training's mean; the training lies 1 from it (RMS), (F,)."""
-        return np.linalg.norm(self.scaled(features), axis=1)
-
 
 def gaussian_activations(scaled: np.ndarray, prototypes: np.ndarray, beta: float) -> np.ndarray:
     """exp(-beta |p - f|^2), (F, N), of features (F, M) and prototypes (N, M) (Lips16 eq. 2)."""

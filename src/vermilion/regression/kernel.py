@@ -34,11 +34,11 @@ class KernelRegressor(LinearOutputs):
         tolerance: rest of the kernel's diagonal that is let go, of its mean.
         max_pivots: at most so many pivots.
 
-    Attributes (fitted): `pivots_` (P, M) scaled; `whitening_` (P, P) from kernel values at the pivots
-    to the design; `deviation_` (P, P) from the centred design to what is uncertain of a prediction.
+    Attributes (fitted): `pivots_` (P, M) scaled, `whitening_` (P, P) from kernel values at the pivots
+    to the design, and those of `LinearOutputs`.
     """
 
-    FITTED = ("pivots_", "whitening_", "deviation_", *LinearOutputs.FITTED)
+    FITTED = ("pivots_", "whitening_", *LinearOutputs.FITTED)
 
     def __init__(
         self,
@@ -69,11 +69,6 @@ class KernelRegressor(LinearOutputs):
         self.pivots_ = scaled[rows]
         triangle = np.tril(factor[rows])
         self.whitening_ = linalg.solve_triangular(triangle, np.eye(len(rows)), lower=True).T
-        centred = factor - factor.mean(axis=0)
-        gram = centred.T @ centred
-        gram[np.diag_indices_from(gram)] += self.alpha
-        root = linalg.cholesky(gram)
-        self.deviation_ = np.sqrt(self.alpha) * linalg.solve_triangular(root, np.eye(len(rows)))
 
     def _design(self, scaled: np.ndarray) -> np.ndarray:
         return self.kernel(scaled, self.pivots_) @ self.whitening_
@@ -87,15 +82,13 @@ class KernelRegressor(LinearOutputs):
         return 1.0 + self.linear * (scaled**2).sum(axis=1)
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """Standard deviation of a prediction, of 1 where nothing is known, (F,).
+        """Standard deviation of a prediction, in units of the smooth part's prior deviation, (F,).
 
-        In units of the layers' prior deviation; the noise of a single frame is not in it.
+        With what the pivots cannot tell; the noise of a single frame is not in it.
         """
         scaled = self.scaled(features)
-        design = self._design(scaled)
-        known = ((design - self.mean_activation_) @ self.deviation_) ** 2
-        rest = np.maximum(self._diagonal(scaled) - (design**2).sum(axis=1), 0.0)
-        return np.sqrt(known.sum(axis=1) + rest)
+        rest = self._diagonal(scaled) - (self._design(scaled) ** 2).sum(axis=1)
+        return np.hypot(super().novelty(features), np.sqrt(np.maximum(rest, 0.0)))
 
 
 def pivoted_cholesky(

@@ -26,8 +26,8 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         basis_error: how much the basis may change a prediction (`layer_basis`); 0 for nothing.
 
     Attributes (fitted): `coefficients_` (P, R) and `basis_` (R, K), whose product are the weights,
-    `person_biases_` (G, K), `bias_` (K,) of anybody else, `mean_activation_` (P,),
-    `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
+    `person_biases_` (G, K), `bias_` (K,) of anybody else, `mean_activation_` (P,), `deviation_` (P, P)
+    from the centred design to what is uncertain of a prediction, `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
     """
 
     #: Fitted arrays, by the names that they have in a model file with an underscore.
@@ -41,6 +41,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         "feature_low_",
         "feature_high_",
         "mean_activation_",
+        "deviation_",
     )
 
     def __init__(
@@ -67,8 +68,13 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         return scaled
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """How far features (F, M) lie from those of the training, (F,)."""
-        raise NotImplementedError
+        """How far features (F, M) lie from those of the training, (F,).
+
+        The standard deviation of a prediction, in units of the weights' prior deviation times the
+        design: weights of variance 1, noise of variance alpha.
+        """
+        design = self._design(self.scaled(features))
+        return np.linalg.norm((design - self.mean_activation_) @ self.deviation_, axis=1)
 
     def fit(
         self,
@@ -122,6 +128,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         self._choose(scaled, sequences, **chosen)
         design = self._design(scaled)
         self.mean_activation_ = design.mean(axis=0)
+        self.deviation_ = uncertain_directions(design - self.mean_activation_, self.alpha)
         return design
 
     def scaled(self, features: np.ndarray) -> np.ndarray:
@@ -190,6 +197,19 @@ def layer_basis(
     chosen = components[:, :rank]
     basis = (chosen.T @ rotated).astype(weights.dtype) @ weights
     return (vectors / size) @ chosen, basis
+
+
+def uncertain_directions(centred: np.ndarray, alpha: float) -> np.ndarray:
+    """Root D (P, P) of the weights' posterior covariance D D' = alpha (Phi' Phi + alpha)^-1.
+
+    Args:
+        centred: (F, P) design less its mean.
+        alpha: ridge parameter, the variance of the noise where that of the weights is 1.
+    """
+    gram = centred.T @ centred
+    gram[np.diag_indices_from(gram)] += alpha
+    inverse = linalg.solve_triangular(linalg.cholesky(gram), np.eye(len(gram)))
+    return np.sqrt(alpha) * inverse
 
 
 def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
