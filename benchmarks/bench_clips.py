@@ -15,6 +15,7 @@ import os
 import resource
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -62,8 +63,10 @@ def job(arguments, frames, ends) -> tuple[float, float]:
 
 def timed(arguments, clips, processes: int):
     start = time.perf_counter()
-    with multiprocessing.get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
-        found = pool.starmap(job, [(arguments, *clip) for clip in clips], chunksize=1)
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, spawn, max_tasks_per_child=1) as pool:
+        jobs = [pool.submit(job, arguments, *clip) for clip in clips]
+        found = [running.result() for running in jobs]
     return time.perf_counter() - start, found
 
 
