@@ -19,6 +19,7 @@ CFG = {
     "inpaint.domain": {"texel_mm": 0.4, "skin_mm": 9.0, "inner_mm": 4.0},
     "inpaint.mask": {},
     "inpaint.shading": {},
+    "inpaint.opening": {},
     "inpaint.composite": {"lens_px": 0.0},
 }
 

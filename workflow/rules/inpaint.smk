@@ -94,7 +94,11 @@ rule inpaint:
         runtime=lambda wildcards: 10 + len(frames_in(wildcards.chunk)) // 10,
     params:
         cfg=cfg_of(
-            "inpaint.domain", "inpaint.shading", "inpaint.composite", "capture.frontal_camera"
+            "inpaint.domain",
+            "inpaint.shading",
+            "inpaint.opening",
+            "inpaint.composite",
+            "capture.frontal_camera",
         ),
         code=code_of("inpaint_frames"),
         frames=lambda wildcards: frames_in(wildcards.chunk),

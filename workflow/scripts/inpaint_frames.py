@@ -3,7 +3,7 @@
 import numpy as np
 
 from vermilion.camera import read_cameras
-from vermilion.config.inpaint import CompositeConfig, DomainConfig, ShadingConfig
+from vermilion.config.inpaint import CompositeConfig, DomainConfig, OpeningConfig, ShadingConfig
 from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
 from vermilion.files import atomic_folder
@@ -12,6 +12,7 @@ from vermilion.images import write_image, write_srgb8
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.grain import seed_of
+from vermilion.inpaint.opening import Evidence
 from vermilion.inpaint.overlay import before_after, sample_frames, sheet
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading
@@ -34,6 +35,7 @@ def paint_of(snakemake, model, place):
     paint = Paint(
         domain, plain, reference, more["opacity"], Shading(**light), cfg.edge_mm,
         how.lens_px, how.rim_px, how.samples, how.grain, gap_mm,
+        Evidence(**OpeningConfig(**snakemake.params.cfg["inpaint.opening"]).model_dump()),
     )  # fmt: skip
     return paint, how.seed
 

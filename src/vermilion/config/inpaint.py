@@ -85,6 +85,64 @@ class ShadingConfig(StageConfig):
         le=10.0,
         description="Largest gain of the shading; its inverse is the smallest.",
     )
+    seam_mm: float = Field(
+        1.0,
+        ge=0.0,
+        le=5.0,
+        description="Next to where the lips meet, shading is read along the inner contours, up to this "
+        "far from them (mm; `ratio` only, 0: not).",
+    )
+    seam_along_mm: float = Field(
+        4.0, ge=0.5, le=20.0, description="Gaussian average along the inner contours (mm)."
+    )
+
+
+class OpeningConfig(StageConfig):
+    """Where the mouth opens: the contours of the mesh, corrected by what the picture shows."""
+
+    reach_mm: float = Field(
+        2.5,
+        ge=0.0,
+        le=10.0,
+        description="Furthest correction of a contour (mm); 0: the mesh's own.",
+    )
+    step_mm: float = Field(
+        0.12, ge=0.02, le=1.0, description="Step of that search (mm), half a pixel at least."
+    )
+    clear_mm: float = Field(
+        1.0,
+        ge=0.0,
+        le=5.0,
+        description="Lips closer than this to the mesh's contour do not teach the tattoo's colours (mm).",
+    )
+    inside_mm: float = Field(
+        0.3,
+        ge=0.0,
+        le=5.0,
+        description="The opening closer than this to the mesh's contour does not teach the colours of "
+        "the mouth's inside (mm).",
+    )
+    black: float = Field(
+        0.2, ge=0.01, le=10.0, description="Weight of black among those colours (theirs: 1)."
+    )
+    teeth: float = Field(
+        0.3, ge=0.0, le=10.0, description="Weight of the colours of teeth among them (theirs: 1)."
+    )
+    unlike: float = Field(
+        0.2, ge=0.001, le=0.9, description="Share of the inside that may have any colour (0 to 1)."
+    )
+    sure: float = Field(
+        4.0, ge=0.5, le=20.0, description="Logarithm of a ratio of likelihoods that counts in full."
+    )
+    prior: float = Field(
+        1.0,
+        ge=0.0,
+        le=1000.0,
+        description="Cost of a contour one millimetre off the mesh's (points of the search).",
+    )
+    smooth: float = Field(
+        0.6, ge=0.0, le=100.0, description="Cost of a bend by one point (points of the search)."
+    )
 
 
 class CompositeConfig(StageConfig):
@@ -92,10 +150,10 @@ class CompositeConfig(StageConfig):
 
     samples: int = Field(3, ge=1, le=8, description="Rays a pixel, along each side (count).")
     lens_px: float = Field(
-        0.5, ge=0.0, le=5.0, description="Blur of the camera: deviation of a Gaussian (pixels)."
+        0.4, ge=0.0, le=5.0, description="Blur of the camera: deviation of a Gaussian (pixels)."
     )
     rim_px: float = Field(
-        2.5,
+        1.0,
         ge=0.0,
         le=10.0,
         description="Pixels of the mouth opening this close to the lips are freed of the tattoo that "
@@ -116,6 +174,9 @@ class InpaintConfig(StageConfig):
     mask: MaskConfig = Field(default_factory=MaskConfig, description="Where the tattoo is.")
     shading: ShadingConfig = Field(
         default_factory=ShadingConfig, description="How shading is carried over."
+    )
+    opening: OpeningConfig = Field(
+        default_factory=OpeningConfig, description="Where the mouth opens."
     )
     composite: CompositeConfig = Field(
         default_factory=CompositeConfig, description="How the texture is rendered into a frame."

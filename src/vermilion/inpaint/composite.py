@@ -9,7 +9,8 @@ import numpy as np
 
 from vermilion.camera import Camera
 from vermilion.inpaint.domain import LipDomain
-from vermilion.inpaint.fields import blur, luminance, sample, weighted_blur
+from vermilion.inpaint.fields import blur, fill_holes, luminance, sample, weighted_blur
+from vermilion.inpaint.opening import Opening
 from vermilion.raycast import RayCaster
 
 
@@ -72,8 +73,13 @@ def render_layer(
     camera: Camera,
     window: Window,
     samples: int = 3,
+    opening: Opening | None = None,
 ) -> Layer:
-    """Render a texture (h, w, 3) and its opacity (h, w), `samples` squared rays a pixel."""
+    """Render a texture (h, w, 3) and its opacity (h, w), `samples` squared rays a pixel.
+
+    Where an `opening` is given, it decides what is lip and what is open between the corners of the
+    mouth; where the mesh has no lip, the colour of the lip beside is continued.
+    """
     size = (window.height * samples, window.width * samples)
     x, y = np.meshgrid(np.arange(size[1]) + 0.5, np.arange(size[0]) + 0.5)
     pixels = np.stack([x, y], axis=-1) / samples + [window.x, window.y]
@@ -86,6 +92,9 @@ def render_layer(
     colour = sample(texture, texel) * alpha[..., None]
     # The mouth's inside and the background; bare skin outside the domain stays as it is.
     outside = ~hits.hit | (~on_domain & ~domain.skin[triangle])
+    if opening is not None:
+        inner = outside | (on_domain & (sample(domain.inner.astype(np.float32), texel) > 0.5))
+        alpha, colour, outside = _opened(opening, pixels, inner, outside, alpha, colour)
     shrink = (window.width, window.height)
     return Layer(
         window,
@@ -93,6 +102,26 @@ def render_layer(
         cv2.resize(alpha.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
         cv2.resize(outside.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
     )
+
+
+def _opened(
+    opening: Opening,
+    pixels: np.ndarray,
+    inner: np.ndarray,
+    outside: np.ndarray,
+    alpha: np.ndarray,
+    colour: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Opacity, colour and what is open, with the opening that the picture shows for the mesh's."""
+    open_here, near = opening.inside(pixels), opening.near(pixels)
+    lacking = near & inner & ~open_here
+    painted = (alpha > 0.99) & ~inner & ~open_here
+    if lacking.any() and painted.any():
+        colour = np.where(lacking[..., None], fill_holes(colour, painted), colour)
+        alpha = np.where(lacking, 1.0, alpha)
+    alpha = np.where(open_here, 0.0, alpha)
+    colour = np.where(open_here[..., None], 0.0, colour)
+    return alpha, colour, np.where(near & inner, open_here, outside | open_here)
 
 
 def softened(layer: Layer, sigma_px: float) -> Layer:
@@ -107,63 +136,6 @@ def softened(layer: Layer, sigma_px: float) -> Layer:
         opacity=blur(layer.opacity, sigma_px),
         open=blur(opened, sigma_px)[edge:-edge, edge:-edge],
     )
-
-
-def opened_by_darkness(layer: Layer, linear: np.ndarray, darkest: float, reach_px: float) -> Layer:
-    """The layer without pixels that are too dark to be lips, next to the mouth opening.
-
-    The mesh misses the inner contour by a fraction of a millimetre; the dark gap between the lips
-    tells where it is.
-
-    Args:
-        linear: (h, w, 3) the whole picture.
-        darkest: luminance that the tattooed lips hardly ever fall below.
-        reach_px: how far from the opening of the mesh.
-    """
-    opening = layer.open > 0.5
-    if not opening.any() or darkest <= 0:
-        return layer
-    grey = luminance(linear[layer.window.slices])
-    distance = cv2.distanceTransform((~opening).astype(np.uint8), cv2.DIST_L2, 5)
-    # Along the gap, towards the corners of the mouth, darkness is followed three times as far.
-    gap = ((grey < darkest) & (distance <= 3.0 * reach_px)) | opening
-    _, part = cv2.connectedComponents(gap.astype(np.uint8), connectivity=8)
-    gap &= np.isin(part, np.unique(part[opening]))
-    near = np.clip(1.5 - distance / max(reach_px, 1e-6), 0.0, 1.0)
-    dark = np.clip(2.0 - grey / darkest, 0.0, 1.0) * np.maximum(near, gap & ~opening)
-    # The pattern shows through where the lens mixed it with the gap; its contour is smooth.
-    evidence = np.maximum(dark, layer.open).astype(np.float32)
-    along = cv2.filter2D(evidence, -1, _kernel_along(opening), borderType=cv2.BORDER_REPLICATE)
-    opened = np.clip(2.0 * (along - 0.5) + 0.6, 0.0, 1.0)
-    keep = np.clip((1.0 - opened) / np.maximum(1.0 - layer.open, 1e-3), 0.0, 1.0)
-    keep[_islands(layer.opacity * keep > 0.3)] = 0.0
-    return replace(
-        layer,
-        rgb=layer.rgb * keep[..., None],
-        opacity=layer.opacity * keep,
-        open=np.minimum(layer.open + layer.opacity * (1.0 - keep), 1.0),
-    )
-
-
-def _islands(painted: np.ndarray, share: float = 0.03) -> np.ndarray:
-    """Small parts of what is painted, cut off by the gap: they are no lips."""
-    _, part, facts, _ = cv2.connectedComponentsWithStats(painted.astype(np.uint8), connectivity=8)
-    small = facts[:, cv2.CC_STAT_AREA] < share * painted.sum()
-    small[0] = False
-    return small[part]
-
-
-def _kernel_along(opening: np.ndarray, long_px: float = 2.0, short_px: float = 0.4) -> np.ndarray:
-    """An elongated Gaussian along the main axis of a mask."""
-    y, x = np.nonzero(opening)
-    axis = np.array([1.0, 0.0])
-    if len(x) > 10:
-        axis = np.linalg.eigh(np.cov(np.stack([x, y])))[1][:, -1]
-    offset = np.arange(-7, 8)
-    dx, dy = np.meshgrid(offset, offset)
-    u, v = dx * axis[0] + dy * axis[1], -dx * axis[1] + dy * axis[0]
-    kernel = np.exp(-0.5 * ((u / long_px) ** 2 + (v / short_px) ** 2))
-    return (kernel / kernel.sum()).astype(np.float32)
 
 
 def composite(linear: np.ndarray, layer: Layer, rim_px: float, darkest: float = 0.0) -> np.ndarray:

@@ -32,6 +32,8 @@ class LipDomain:
     Attributes:
         in_domain: (T,) bool, triangles that carry texture.
         skin: (T,) bool, triangles of the outer face, in the domain or not.
+        lip: (T,) int8: 1 upper vermilion, 2 lower, 0 elsewhere.
+        corners: (2,) vertices at both ends of the lips.
         texel_of_vertex: (V, 2) x, y in texels of each vertex.
         triangle: (h, w) int32 triangle of the mesh at each texel, -1 outside.
         barycentric: (h, w, 3) float32 at each texel.
@@ -43,6 +45,8 @@ class LipDomain:
 
     in_domain: np.ndarray
     skin: np.ndarray
+    lip: np.ndarray
+    corners: np.ndarray
     texel_of_vertex: np.ndarray
     triangle: np.ndarray
     barycentric: np.ndarray
@@ -144,6 +148,8 @@ def lip_domain(model: FaceModel, skin_mm: float, inner_mm: float, texel_mm: floa
     return LipDomain(
         in_domain,
         outer[model.triangles].any(axis=1),
+        _lip_of_triangle(model),
+        _ends_of(model, vermilion),
         texel,
         triangle,
         barycentric,
@@ -152,6 +158,21 @@ def lip_domain(model: FaceModel, skin_mm: float, inner_mm: float, texel_mm: floa
         (model.neutral_mm[corners] * barycentric[..., None]).sum(axis=-2).astype(np.float32),
         texel_mm,
     )
+
+
+def _lip_of_triangle(model: FaceModel) -> np.ndarray:
+    upper, lower = model.regions["vermilion_upper"], model.regions["vermilion_lower"]
+    red = (upper | lower)[model.triangles].all(axis=1)
+    is_upper = upper[model.triangles].sum(axis=1) >= 2
+    return np.where(red, np.where(is_upper, 1, 2), 0).astype(np.int8)
+
+
+def _ends_of(model: FaceModel, vermilion: np.ndarray) -> np.ndarray:
+    """Vertices of the vermilion furthest apart along its main axis on the neutral, (2,)."""
+    red = np.flatnonzero(vermilion)
+    points = model.neutral_mm[red] - model.neutral_mm[red].mean(axis=0)
+    along = points @ np.linalg.eigh(points.T @ points)[1][:, -1]
+    return red[[along.argmin(), along.argmax()]]
 
 
 def _distance_from(model: FaceModel, source: np.ndarray, limit_mm: float) -> np.ndarray:

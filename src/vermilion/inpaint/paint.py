@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,17 +11,19 @@ from vermilion.camera import Camera
 from vermilion.images import linear_to_srgb
 from vermilion.inpaint.bake import Texture, bake
 from vermilion.inpaint.composite import (
+    Layer,
     Window,
     composite,
-    opened_by_darkness,
     render_layer,
     softened,
     window_of,
 )
 from vermilion.inpaint.domain import LipDomain
-from vermilion.inpaint.fields import luminance, weighted_blur
+from vermilion.inpaint.fields import fill_holes, luminance, weighted_blur
 from vermilion.inpaint.grain import add_grain, missing_grain
-from vermilion.inpaint.shading import Shading, bare_skin, equalised, under_reference
+from vermilion.inpaint.opening import Evidence, Opening, find_opening
+from vermilion.inpaint.seam import seam_gain
+from vermilion.inpaint.shading import Shading, bare_skin, change_ratio, equalised, under_reference
 from vermilion.raycast import RayCaster
 
 
@@ -41,6 +43,7 @@ class Paint:
         samples: rays a pixel, a side.
         grain: match the picture's noise.
         gap_mm: skin closer than this to the painted region is not trusted to be bare.
+        evidence: how the picture is asked where the mouth opens.
     """
 
     domain: LipDomain
@@ -49,11 +52,12 @@ class Paint:
     opacity: np.ndarray
     shading: Shading
     edge_mm: float = 0.8
-    lens_px: float = 0.5
-    rim_px: float = 2.5
+    lens_px: float = 0.4
+    rim_px: float = 1.0
     samples: int = 3
     grain: bool = True
     gap_mm: float = 1.0
+    evidence: Evidence = field(default_factory=Evidence)
 
     @cached_property
     def bare(self) -> np.ndarray:
@@ -64,6 +68,11 @@ class Paint:
     def base(self) -> np.ndarray:
         """(h, w, 3) the plain texture under the light of the reference pose."""
         return under_reference(self.domain, self.plain, self.reference, self.bare, self.shading)
+
+    @cached_property
+    def tattooed(self) -> np.ndarray:
+        """(h, w, 3) the tattoo under the light of the reference pose, continued where unseen."""
+        return fill_holes(self.reference.rgb, self.reference.seen)
 
     @cached_property
     def unpainted(self) -> np.ndarray:
@@ -111,12 +120,13 @@ def paint_frame(
     caster = RayCaster(vertices_mm, triangles)
     frame = bake(domain, vertices_mm, triangles, [(camera, linear)], paint.edge_mm)
     texture = equalised(domain, paint.base, paint.reference, frame, paint.bare, paint.shading)
-    layer = render_layer(domain, texture, paint.opacity, caster, camera, window, paint.samples)
+    opening = _opening(paint, caster, camera, linear, vertices_mm, window)
+    layer = render_layer(
+        domain, texture, paint.opacity, caster, camera, window, paint.samples, opening
+    )
     layer = softened(layer, paint.lens_px)
-    pixel_mm = _pixel_mm(camera, vertices_mm[np.unique(triangles[domain.in_domain])])
-    reach_px = paint.edge_mm / pixel_mm
     darkest = _darkest(paint)
-    layer = opened_by_darkness(layer, linear, darkest, reach_px)
+    layer = _shaded_at_seam(paint, layer, opening, frame, linear, caster, camera)
     result = composite(linear, layer, paint.rim_px, darkest)
     # The same rendering on the bare skin, to compare with the picture.
     skin = render_layer(domain, texture, paint.unpainted, caster, camera, window, paint.samples)
@@ -133,6 +143,60 @@ def paint_frame(
         int((layer.opacity > 0.5).sum()),
         _colour_levels(patch, rendered, only_skin, near),
     )
+
+
+def _opening(
+    paint: Paint,
+    caster: RayCaster,
+    camera: Camera,
+    linear: np.ndarray,
+    vertices_mm: np.ndarray,
+    window: Window,
+) -> Opening | None:
+    """The mouth opening that the picture shows; None where the lips are too small or hidden."""
+    ends = camera.project(vertices_mm[paint.domain.corners])
+    length = np.linalg.norm(ends[1] - ends[0])
+    if not np.isfinite(length) or length < 8.0:
+        return None
+    low = np.array([window.x, window.y])
+    return find_opening(
+        paint.domain,
+        caster,
+        camera,
+        linear,
+        (ends[1] - ends[0]) / length,
+        (low, low + np.array([window.width, window.height])),
+        _pixel_mm(camera, vertices_mm[paint.domain.corners]),
+        paint.evidence,
+    )
+
+
+def _shaded_at_seam(
+    paint: Paint,
+    layer: Layer,
+    opening: Opening | None,
+    frame: Texture,
+    linear: np.ndarray,
+    caster: RayCaster,
+    camera: Camera,
+) -> Layer:
+    """The layer with the shading that the picture shows next to where the lips meet."""
+    shading = paint.shading
+    if opening is None or shading.mode != "ratio" or shading.seam_mm <= 0:
+        return layer
+    change = change_ratio(paint.domain, paint.reference, frame, shading)[..., None]
+    tattooed = render_layer(
+        paint.domain, paint.tattooed * change, paint.opacity, caster, camera, layer.window,
+        paint.samples, opening,
+    )  # fmt: skip
+    gain = seam_gain(
+        opening,
+        softened(tattooed, paint.lens_px),
+        linear,
+        shading.seam_mm / opening.pixel_mm,
+        shading.seam_along_mm / opening.pixel_mm,
+    )
+    return replace(layer, rgb=layer.rgb * gain[..., None])
 
 
 def _darkest(paint: Paint) -> float:

@@ -28,12 +28,16 @@ class Shading:
         sigma_mm: low-pass of the change between a frame and the reference.
         border_mm: low-pass of the match to the skin round the painted region.
         limit: largest gain, and its inverse the smallest.
+        seam_mm: how far from the inner contours shading is read along them (`ratio` only; 0: not).
+        seam_along_mm: Gaussian average along the contours.
     """
 
     mode: str = "ratio"
     sigma_mm: float = 2.0
     border_mm: float = 2.0
     limit: float = 2.5
+    seam_mm: float = 1.0
+    seam_along_mm: float = 4.0
 
 
 def under_reference(
