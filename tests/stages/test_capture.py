@@ -62,9 +62,12 @@ def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
         "cameras",
         wildcards={"subject": "s1", "take": "t1"},
         params={
-            "cfg": {"capture.calibration": {"camera_model": "PINHOLE"}},
+            "cfg": {
+                "capture.calibration": {"camera_model": "PINHOLE"},
+                "capture.refinement": {},
+            },
             "camera": "mid",
-            "neutral": 0,
+            "frames": [0, 2],
         },
         input={"manifests": manifests},
         output={

@@ -75,7 +75,7 @@ rule capture:
 
 
 rule cameras:
-    """Reads, calibrates or assumes the cameras of a take: cameras/ (COLMAP text), cameras.json."""
+    """Reads, calibrates or assumes a take's cameras, refines them: cameras/ (COLMAP text), cameras.json."""
     input:
         calibration=camera_inputs,
         manifests=per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
@@ -91,9 +91,9 @@ rule cameras:
         mem_mb=1500,
         runtime=60,
     params:
-        cfg=cfg_of("capture.calibration"),
+        cfg=cfg_of("capture.calibration", "capture.refinement"),
         code=code_of("cameras"),
         camera=mono_camera,
-        neutral=lambda wildcards: take_of(wildcards).first,
+        frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
     script:
         "../scripts/cameras.py"

@@ -10,7 +10,7 @@ import numpy as np
 from vermilion.capture.calibrate import Calibration
 from vermilion.draw import draw_points, label, tile, to_display
 
-SEEN, EXPECTED = (60, 220, 60), (255, 60, 60)
+SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 
 
 def contact_sheet(
@@ -48,6 +48,36 @@ def calibration_sheet(
         rms = calibration.camera_reprojection_px[name]
         tiles.append(label(picture, f"{name} {moment}  {rms:.3f} px"))
     return tile(tiles, min(4, len(tiles)))
+
+
+def refinement_sheet(
+    pictures: Mapping[str, np.ndarray | None],
+    shown: Mapping[str, tuple],
+    moved: Mapping[str, Mapping[str, float]],
+    height_px: int = 480,
+) -> np.ndarray:
+    """Held-out points as seen (green) and as expected by the given (red) and refined cameras (blue).
+
+    Args:
+        pictures: camera -> linear picture, or None.
+        shown, moved: of a `Refinement`.
+    """
+    tiles = []
+    for name, linear in pictures.items():
+        if linear is None or name not in shown:
+            continue
+        scale = height_px / linear.shape[0]
+        picture = _fitted(to_display(linear), height_px)
+        seen, given, refined = shown[name]
+        picture = draw_points(picture, given * scale, EXPECTED, 2)
+        picture = draw_points(picture, seen * scale, SEEN, 2)
+        if refined is not None:
+            picture = draw_points(picture, refined * scale, REFINED, 1)
+        text = name
+        if name in moved:
+            text += f"  {moved[name]['turned_deg']:.2f} deg {moved[name]['moved_mm']:.2f} mm"
+        tiles.append(label(picture, text))
+    return tile(tiles, min(5, len(tiles)))
 
 
 def worst_view(calibration: Calibration, camera: str) -> str:

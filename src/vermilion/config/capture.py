@@ -88,6 +88,97 @@ class CalibrationConfig(StageConfig):
         return self
 
 
+class RefinementConfig(StageConfig):
+    """Refinement of the cameras' poses over skin and tattoo features (bundle adjustment)."""
+
+    mode: Literal["off", "auto", "on"] = Field(
+        "auto",
+        description="`off`: never; `auto`: where the given poses are off and the refined ones are "
+        "clearly better on held-out tracks; `on`: always tried, an error where it fails.",
+    )
+    board_calibrated: bool = Field(
+        False, description="Also refine cameras that were calibrated here from a board."
+    )
+    frames: int = Field(
+        3, ge=1, le=50, description="Frames used, evenly spaced from the first to the last (count)."
+    )
+    contrast: float = Field(
+        0.002, gt=0, lt=0.1, description="Smallest contrast of a feature (of the range of grey)."
+    )
+    max_features: int = Field(
+        6000, ge=100, le=50000, description="Features of one picture at most (count)."
+    )
+    gate_deg: float = Field(
+        1.0,
+        gt=0,
+        le=10,
+        description="How far a match may lie from the epipolar plane of the given poses (degrees).",
+    )
+    fine_gate_deg: float = Field(
+        0.1, gt=0, le=10, description="The same once the poses are refined roughly (degrees)."
+    )
+    max_angle_deg: float = Field(
+        40.0,
+        gt=0,
+        le=90,
+        description="Cameras whose axes differ by more are not matched (degrees).",
+    )
+    ratio: float = Field(
+        0.85,
+        gt=0,
+        le=1,
+        description="Largest ratio of descriptor distances, best over second best match.",
+    )
+    verify_px: float = Field(
+        2.0,
+        gt=0,
+        le=50,
+        description="A match agrees with its pair's geometry within this (pixels).",
+    )
+    min_pair: int = Field(
+        15, ge=6, description="A pair of cameras with fewer agreeing matches is not used (count)."
+    )
+    max_residual_px: float = Field(
+        1.0, gt=0, le=20, description="Observations farther off at the end are outliers (pixels)."
+    )
+    loss_px: float = Field(
+        0.3, gt=0, le=20, description="Residual at which the robust loss becomes linear (pixels)."
+    )
+    min_tracks: int = Field(
+        100, ge=20, description="Nothing is refined over fewer points seen by two cameras (count)."
+    )
+    min_camera_tracks: int = Field(
+        30, ge=6, description="A camera with fewer observations keeps its given pose (count)."
+    )
+    held_out: float = Field(
+        0.2, ge=0.05, le=0.5, description="Part of the tracks held out to judge the result."
+    )
+    threshold_px: float = Field(
+        1.0,
+        ge=0,
+        le=50,
+        description="`auto` leaves cameras alone whose median error is below (pixels).",
+    )
+    improvement: float = Field(
+        0.7,
+        gt=0,
+        lt=1,
+        description="Refined cameras are taken where the held-out median error falls to this part "
+        "of the given cameras' or below.",
+    )
+    turn_deg: float = Field(
+        0.3, gt=0, le=10, description="Expected error of a given orientation (degrees)."
+    )
+    shift_mm: float = Field(
+        1.0,
+        gt=0,
+        le=100,
+        description="Expected error of a given position (mm); it holds the rig's shape.",
+    )
+    refine_focal: bool = Field(False, description="Also adjust the focal lengths.")
+    seed: int = Field(0, ge=0, description="Of the random samples.")
+
+
 class CaptureConfig(StageConfig):
     """Checks of captures and calibration of their cameras (Lips16 3.1)."""
 
@@ -102,4 +193,7 @@ class CaptureConfig(StageConfig):
     )
     calibration: CalibrationConfig = Field(
         default_factory=CalibrationConfig, description="Calibration from pictures of a board."
+    )
+    refinement: RefinementConfig = Field(
+        default_factory=RefinementConfig, description="Refinement of the cameras' poses."
     )
