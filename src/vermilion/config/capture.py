@@ -100,7 +100,7 @@ class RefinementConfig(StageConfig):
         False, description="Also refine cameras that were calibrated here from a board."
     )
     frames: int = Field(
-        3, ge=1, le=50, description="Frames used, evenly spaced from the first to the last (count)."
+        1, ge=1, le=50, description="Frames used, evenly spaced from the first to the last (count)."
     )
     contrast: float = Field(
         0.002, gt=0, lt=0.1, description="Smallest contrast of a feature (of the range of grey)."
