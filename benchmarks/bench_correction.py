@@ -28,6 +28,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from vermilion.correction.apply import Corrector
+from vermilion.correction.domain import mesh_corners
 from vermilion.correction.layers import decode_layers
 from vermilion.correction.right_side import LANES, TURN_SERIES, accumulate_mixture, turn_limits
 from vermilion.correspondence.correspondence import topology_hash
@@ -76,7 +77,8 @@ def fitted_model(
     places, values = zip(*SPECTRA[kind].items(), strict=True)
     count = min(len(stretch), places[-1])
     deviations = np.exp(np.interp(np.arange(count), places, np.log(values)))
-    n_outputs = 9 * len(mask)
+    corners = mesh_corners(triangles, mask)
+    n_outputs = 9 * len(mask) + 3 * len(corners)
     weights = directions[:count].T * (0.05 * np.sqrt(len(features)) * deviations / stretch[:count])
     weights = weights.astype(np.float32) @ rng.standard_normal((count, n_outputs), dtype=np.float32)
     estimator.coefficients_, estimator.basis_ = layer_basis(design, weights, 0.1, basis_error)
@@ -88,6 +90,7 @@ def fitted_model(
         feature_columns=np.arange(53),
         mask=mask,
         topology=topology_hash(triangles),
+        vertices=corners,
         training_frames={},
     )
 
@@ -154,8 +157,9 @@ def main() -> None:
     print(f"mesh {len(vertices)} vertices, mask {len(mask)} triangles")
     for kind in SPECTRA:
         model = fitted_model(kind, triangles, mask, arguments.basis_error)
-        report(kind, Corrector(model, vertices, triangles), coarse, features)
-    other = peer(corrector := Corrector(model, vertices, triangles), coarse, features, triangles)
+        report(kind, Corrector(model, vertices, triangles, detail_mm=10.0), coarse, features)
+    corrector = Corrector(model, vertices, triangles)  # the peer knows no displacements
+    other = peer(corrector, coarse, features, triangles)
     difference = np.abs(other() - corrector.correct(coarse[:8], features[:8])).max()
     numpy_ms = best_ms({"peer": (other, 8)}, rounds=2)["peer"]
     print(f"peer (NumPy, SciPy SuperLU)     {numpy_ms:8.2f} ms a frame, {difference:.1e} mm apart")

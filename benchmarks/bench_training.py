@@ -36,8 +36,15 @@ def paper_sized_data() -> TrainingSet:
         part += 0.01 * rng.standard_normal(part.shape, dtype=np.float32)
     names = tuple(f"s{k}/rom" for k in range(4))
     neutrals = {f"s{k}": rng.normal(size=(4, 3)) for k in range(4)}
+    # The paper's size has no displacements.
     return TrainingSet(
-        features.astype(np.float32), layers, takes, names, np.arange(N_FRAMES), neutrals
+        features.astype(np.float32),
+        layers,
+        np.zeros((N_FRAMES, 0), np.float32),
+        takes,
+        names,
+        np.arange(N_FRAMES),
+        neutrals,
     )
 
 
@@ -54,7 +61,7 @@ def main() -> None:
     )
     start = time.perf_counter()
     model, curve = train(
-        "MS", data, names, np.arange(N_TRIANGLES), np.ones(N_TRIANGLES), "", selection
+        "MS", data, names, np.arange(N_TRIANGLES), np.ones(N_TRIANGLES), "", np.arange(0), selection
     )
     seconds = time.perf_counter() - start
     memory_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6

@@ -37,7 +37,7 @@ CFG = {
     "evaluation.measures": MeasuresConfig(bootstrap_samples=200).model_dump(),
     "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
     "evaluation.figures.map_frames": 2,
-    "correction.integration": {"seam_mm": 8.0},
+    "correction.integration": {"seam_mm": 8.0, "detail_mm": 15.0},
     "apply.overlay": OverlayConfig(panel_height_px=160).model_dump(),
     "apply.export": {"obj": True, "usd": True},
 }

@@ -149,6 +149,60 @@ def test_a_part_that_hangs_on_the_mask_follows_it(reach_mm):
     assert np.all(moved[radius > reach_mm + 17] == 0)
 
 
+@pytest.mark.parametrize("detail_mm", [3.0, 30.0])
+def test_true_layers_and_places_return_the_true_mesh(scene, detail_mm):
+    neutral, triangles, mask, coarse, accurate = scene
+    layers = correction_layers(coarse, accurate, triangles[mask])
+    places = (accurate - coarse)[:, np.unique(triangles[mask])]
+    integrator = LayerIntegrator(neutral, triangles, mask, 8.0, detail_mm)
+    corrected = integrator.integrate(coarse, layers, places)
+    np.testing.assert_allclose(corrected, accurate, atol=1e-6)  # mm
+
+
+def test_places_rule_over_long_ranges_and_layers_over_short_ones(scene):
+    """No layers, and places of two wave lengths: the long one comes through, the short one does not."""
+    neutral, triangles, mask, _, _ = scene
+    corners = np.unique(triangles[mask])
+    inner = np.linalg.norm(neutral[corners, :2], axis=1) < 40
+    zero = np.zeros((1, len(mask), 9))
+    integrator = LayerIntegrator(neutral, triangles, mask, 8.0, detail_mm=8.0)
+    kept = []
+    for length_mm in (240.0, 15.0):
+        wave = np.cos(2 * np.pi * neutral[corners, 0] / length_mm)
+        places = np.zeros((1, len(corners), 3))
+        places[0, :, 2] = wave
+        moved = integrator.integrate(neutral[None], zero, places)[0, corners, 2]
+        moved -= neutral[corners, 2]
+        kept.append(moved[inner] @ wave[inner] / (wave[inner] @ wave[inner]))
+    assert kept[0] > 0.9
+    assert kept[1] < 0.2
+
+
+def test_mixed_places_are_as_good_as_given_ones(scene):
+    neutral, triangles, mask, coarse, accurate = scene
+    corners = np.unique(triangles[mask])
+    layers = correction_layers(coarse, accurate, triangles[mask]).reshape(5, -1)
+    places = (accurate - coarse)[:, corners].reshape(5, -1)
+    mixture = np.random.default_rng(4).uniform(size=(20, 5)) / 5
+    integrator = LayerIntegrator(neutral, triangles, mask, 8.0, 10.0)
+    frames = np.arange(20) % 5
+    given = integrator.integrate(
+        coarse[frames], (mixture @ layers).reshape(20, -1, 9), (mixture @ places).reshape(20, -1, 3)
+    )
+    mixed = integrator.integrate_mixture(
+        coarse[frames], mixture, np.ascontiguousarray(layers.T, dtype=np.float32),
+        integrator.weighted_places(places),
+    )  # fmt: skip
+    np.testing.assert_allclose(mixed, given, atol=1e-4)  # mm
+
+
+def test_places_are_asked_for(scene):
+    neutral, triangles, mask, coarse, _ = scene
+    integrator = LayerIntegrator(neutral, triangles, mask, detail_mm=10.0)
+    with pytest.raises(ValueError, match="displacement_mm must be"):
+        integrator.integrate(coarse, np.zeros((5, len(mask), 9)))
+
+
 def test_stiffness_is_positive_and_knows_no_translation():
     neutral, triangles, _ = sheet(8)
     matrix = edge_stiffness(triangles, np.full((len(triangles), 3), 0.5), len(neutral)).toarray()

@@ -152,7 +152,7 @@ def test_features_of_another_number_are_refused(model):
         model.predict(np.zeros((2, 3)))
 
 
-def entry(subject, n_frames=24, n_triangles=4, seed=0):
+def entry(subject, n_frames=24, n_triangles=4, n_corners=6, seed=0):
     rng = np.random.default_rng(seed)
     frames = np.arange(n_frames)
     return TakeEntry(
@@ -163,6 +163,7 @@ def entry(subject, n_frames=24, n_triangles=4, seed=0):
         frames=frames,
         features=rng.normal(size=(n_frames, 4)).astype(np.float32),
         layers=rng.normal(size=(n_frames, n_triangles, 9)).astype(np.float32),
+        displacement_mm=rng.normal(size=(n_frames, n_corners, 3)).astype(np.float32),
         valid=frames != 3,
         train=frames < 20,
     )
@@ -186,6 +187,10 @@ def test_the_database_keeps_the_triangles_that_all_have(database):
         np.testing.assert_array_equal(read.mask, [0, 1, 3])
         np.testing.assert_array_equal(
             read.read_take("ana", "rom").layers, entry("ana").layers[:, [0, 1, 3]]
+        )
+        np.testing.assert_array_equal(read.vertices, np.unique(TRIANGLES[[0, 1, 3]]))
+        np.testing.assert_array_equal(
+            read.read_take("ana", "rom").displacement_mm, entry("ana").displacement_mm
         )
         np.testing.assert_array_equal(read.neutral_mm("bo"), neutral(2))
         assert read.feature_names == NAMES
@@ -235,12 +240,22 @@ def test_too_few_frames_name_the_subjects(database):
 def test_training_chooses_writes_and_reads(database, tmp_path):
     with LipDatabase(database) as read:
         data = read.training_set(["ana", "bo"])
-        place = (read.feature_names, read.mask, read.area_mm2, read.topology)
+        place = (read.feature_names, read.mask, read.area_mm2, read.topology, read.vertices)
     for name in ("MS", "MS-affine", "MS-rbf", "MS-shape-only", "MS-distances-only"):
         trained, curve = train(name, data, *place, Selection(folds=3, clip_frames=6))
         save_model(tmp_path / f"{name}.h5", trained)
         read = load_model(tmp_path / f"{name}.h5")
         assert read.predict(data.features, neutral(1)).shape == (38, 3, 9)
+        assert read.displacements_mm(data.features, neutral(1)).shape == (38, 6, 3)
+        mixture = np.column_stack([read.mixture(data.features), np.ones(38)])
+        layers, displacements_mm = read.basis(neutral(1))
+        np.testing.assert_allclose(
+            (mixture @ layers).reshape(38, 3, 9), read.predict(data.features, neutral(1)), atol=1e-5
+        )
+        np.testing.assert_allclose(
+            (mixture @ displacements_mm).reshape(38, 6, 3),
+            read.displacements_mm(data.features, neutral(1)), atol=1e-4,
+        )  # fmt: skip
         table = curve_table(name, curve)
         assert table["chosen"].sum() == 1
         assert len(table) == curve.mean.size

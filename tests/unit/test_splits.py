@@ -42,7 +42,7 @@ def write(path, takes):
         TakeEntry(
             take.subject, take.take, take.fps, take.split,
             np.arange(12), rng.normal(size=(12, 2)).astype("f4"),
-            rng.normal(size=(12, 2, 9)).astype("f4"), np.ones(12, bool),
+            rng.normal(size=(12, 2, 9)).astype("f4"), np.zeros((12, 4, 3), "f4"), np.ones(12, bool),
             np.isin(np.arange(12), take.train_frames()),
         )
         for take in takes
@@ -86,7 +86,7 @@ def test_a_take_held_out_whole_is_in_no_regressor(tmp_path):
         take_of("bo", "rom", "test:3-5,9-11"),
     ]  # fmt: skip
     write(tmp_path / "lips.h5", takes)
-    place = (NAMES, np.arange(2), np.ones(2), topology_hash(TRIANGLES))
+    place = (NAMES, np.arange(2), np.ones(2), topology_hash(TRIANGLES), np.arange(4))
     with LipDatabase(tmp_path / "lips.h5") as database:
         for name, expected in {
             "MS": {"ana/rom", "bo/rom"}, "PS-ana": {"ana/rom"}, "GR-ana": {"bo/rom"},

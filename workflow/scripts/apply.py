@@ -42,7 +42,7 @@ def main(snakemake):
     pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
     corrected = correct_sequence(
         model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
-        features, valid=tracked, seam_mm=params.cfg["correction.integration"]["seam_mm"],
+        features, valid=tracked, **params.cfg["correction.integration"],
     )  # fmt: skip
     # The picture shows what the file holds: beyond its precision, sums differ from run to run.
     corrected = corrected.astype(np.float32).astype(np.float64)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.config.correction import IntegrationConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.errors import InputError
@@ -57,7 +58,7 @@ def reference(snakemake, tracker, correspondence, frames):
     return reference_of("truth", where, sequence, triangles)
 
 
-def coarse_take(inputs, tracker, fit, frames, seam_mm):
+def coarse_take(inputs, tracker, fit, frames, integration):
     """The coarse track at the frames, with its features."""
     rows = fit.index_of(frames)
     features = read_chunks(inputs.features, frames, ["features", "valid"])
@@ -68,7 +69,7 @@ def coarse_take(inputs, tracker, fit, frames, seam_mm):
         fit.world_from_head_rotation[rows],
         fit.world_from_head_translation_mm[rows],
         np.where(features["valid"][:, None], features["features"], np.nan),
-        seam_mm,
+        **integration.model_dump(),
     )
 
 
@@ -83,13 +84,15 @@ def main(snakemake):
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    take = coarse_take(inputs, tracker, fit, frames, cfg["correction.integration"]["seam_mm"])
+    take = coarse_take(
+        inputs, tracker, fit, frames, IntegrationConfig(**cfg["correction.integration"])
+    )
 
     sequences, true = {"base": take.coarse_mm}, None
     if inputs.get("layers"):
-        layers = read_chunks(inputs.layers, frames, ["layers", "valid"])
-        true = held_out.TrueLayers(correspondence.mask, **layers)
-        sequences["oracle"] = corrected_by_truth(true.mask, true.layers, true.valid, take)
+        layers = read_chunks(inputs.layers, frames, ["layers", "displacement_mm", "valid"])
+        sequences["oracle"] = corrected_by_truth(correspondence.mask, take=take, **layers)
+        true = held_out.TrueLayers(correspondence.mask, layers["layers"], layers["valid"])
     regressed = {
         measure_name(Path(path).stem): held_out.Regressed.of(load_model(path), take)
         for path in inputs.models

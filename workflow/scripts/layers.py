@@ -42,7 +42,9 @@ def main(snakemake):
     write_srgb8(output.overlay, layers_overlay(correspondence, checked, frames))
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     write_quality(output.quality, *place, "correction", quality)
-    save_layers(output.layers, checked, frames, correspondence.mask)
+    save_layers(
+        output.layers, checked, frames, correspondence.mask, correspondence.coarse_triangles
+    )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,10 @@ def main(snakemake):
     selection = Selection(**TrainingConfig(**snakemake.params.cfg["training"]).model_dump())
     with LipDatabase(snakemake.input.database) as database:
         data = database.training_set(training_subjects(name, database.subjects))
-        place = (database.feature_names, database.mask, database.area_mm2, database.topology)
+        place = (
+            database.feature_names, database.mask, database.area_mm2, database.topology,
+            database.vertices,
+        )  # fmt: skip
     model, curve = train(name, data, *place, selection)
     table = curve_table(name, curve, selection.choice)
     print(table.to_string())

@@ -36,6 +36,13 @@ class IntegrationConfig(StageConfig):
         description="Width of the ring outside the mask that may give way, so that the border shows "
         "no crease (mm); 0 fixes everything outside.",
     )
+    detail_mm: float = Field(
+        15.0,
+        ge=0.0,
+        le=1000.0,
+        description="Detail finer than this comes from the layers, the place of the mesh over longer "
+        "ranges from regressed displacements (mm). 0: layers alone, as in the paper.",
+    )
 
 
 class CorrectionConfig(StageConfig):

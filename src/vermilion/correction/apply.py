@@ -1,18 +1,20 @@
 """Corrected meshes of a take: the interface for evaluation, application and propagation.
 
     corrected = correct_sequence(model, coarse_mm, triangles, neutral_mm, rotation, translation_mm,
-                                 features, valid=valid, seam_mm=16.0)          # (F, V, 3) world, mm
+                                 features, valid=valid, seam_mm=16.0, detail_mm=15.0)  # (F, V, 3), mm
 
 `model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
 **C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
 `neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`): it sets the weights
-of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are those of the take. For known layers (the oracle):
+of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are
+those of the take. For known layers and displacements (the oracle):
 
     corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
-                                    translation_mm, valid=valid, seam_mm=16.0)
+                                    translation_mm, valid=valid, seam_mm=16.0,
+                                    displacement_mm=displacement_mm, detail_mm=15.0)
 
 Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
-correct several stretches of one person, make one `LayerIntegrator` and use `Corrector`.
+correct several stretches of one person, use one `Corrector`.
 """
 
 from __future__ import annotations
@@ -33,21 +35,22 @@ class Corrector:
         neutral_mm: np.ndarray,
         triangles: np.ndarray,
         seam_mm: float = 16.0,
+        detail_mm: float = 0.0,
     ):
         model.check_topology(triangles)
         self.model = model
-        self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm)
-        basis, bias = model.basis(np.asarray(neutral_mm, dtype=np.float64))
-        # The bias is one layer more, of which every frame has one.
-        layers = np.concatenate([basis, bias[None]]).reshape(len(basis) + 1, -1)
+        detail_mm = detail_mm if len(model.vertices) else 0.0
+        self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm, detail_mm)
+        layers, displacements_mm = model.basis(np.asarray(neutral_mm, dtype=np.float64))
         self._basis = np.ascontiguousarray(layers.T, dtype=np.float32)
+        self._places = self.integrator.weighted_places(displacements_mm) if detail_mm else None
 
     def correct(self, coarse_mm: np.ndarray, features: np.ndarray) -> np.ndarray:
         """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame."""
         mixture = self.model.mixture(features)
         one = np.ones((len(mixture), 1))
         return self.integrator.integrate_mixture(
-            coarse_mm, np.concatenate([mixture, one], axis=1), self._basis
+            coarse_mm, np.concatenate([mixture, one], axis=1), self._basis, self._places
         )
 
 
@@ -62,12 +65,13 @@ def correct_sequence(
     *,
     valid: np.ndarray | None = None,
     seam_mm: float = 16.0,
+    detail_mm: float = 0.0,
 ) -> np.ndarray:
     """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
 
     Raises ModelFileError where the mesh is not the one that the regressor was trained on.
     """
-    corrector = Corrector(model, neutral_mm, triangles, seam_mm)
+    corrector = Corrector(model, neutral_mm, triangles, seam_mm, detail_mm)
     usable = np.isfinite(features).all(axis=1) & np.isfinite(coarse_mm).all(axis=(1, 2))
     if valid is not None:
         usable &= valid
@@ -90,15 +94,22 @@ def correct_with_layers(
     *,
     valid: np.ndarray | None = None,
     seam_mm: float = 16.0,
+    displacement_mm: np.ndarray | None = None,
+    detail_mm: float = 0.0,
 ) -> np.ndarray:
-    """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,)."""
+    """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,).
+
+    Args:
+        displacement_mm: (F, N, 3) of the mask's corners, needed where `detail_mm` is not 0.
+    """
     usable = np.isfinite(coarse_mm).all(axis=(1, 2))
     if valid is not None:
         usable &= valid
-    integrator = LayerIntegrator(neutral_mm, triangles, mask, seam_mm)
+    integrator = LayerIntegrator(neutral_mm, triangles, mask, seam_mm, detail_mm)
+    places = displacement_mm[usable] if detail_mm > 0 else None
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
     corrected = np.array(coarse_mm, dtype=np.float64)
     corrected[usable] = world_from_head(
-        integrator.integrate(head, layers[usable]), rotation[usable], translation_mm[usable]
+        integrator.integrate(head, layers[usable], places), rotation[usable], translation_mm[usable]
     )
     return corrected

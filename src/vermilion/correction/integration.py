@@ -4,12 +4,17 @@ With G_t the gradient of the layer at triangle t and c the coarse mesh of the fr
 mesh x minimises, over the free vertices of the domain,
 
     sum_t sum_(ij in t) w_ij |(x_i - x_j) - G_t (c_i - c_j)|^2  +  sum_i h_i |x_i - c_i|^2
+                                                       +  sum_i a_i / l^2 |x_i - c_i - p_i|^2
 
 with cotangent weights w of the neutral, G_t = I outside the mask, and x = c at fixed vertices. For
 the displacement d = x - c only mask triangles have a right-hand side, (G_t - I)(c_i - c_j), and the
 matrix depends on the neutral alone: it is factored once a topology and person, and all coordinates
 of a block of frames are solved together. Cotangents are kept positive, so that the matrix is
 definite on any mesh; weights do not matter where a mesh with these gradients exists: it is returned.
+
+The last term is ours (`detail_mm` l > 0): gradients say nothing of where the mesh lies, and its border
+stays where the tracker put it. With displacements p_i of the mask's vertices and their areas a_i, detail
+finer than l comes from the layers, and places over longer ranges from p.
 """
 
 from __future__ import annotations
@@ -19,16 +24,18 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.domain import integration_domain
+from vermilion.correction.domain import integration_domain, mesh_corners
 from vermilion.correction.right_side import (
     LANES,
     TURN_SERIES,
     accumulate,
     accumulate_mixture,
     add_frames,
+    add_places,
     gather,
     turn_limits,
 )
+from vermilion.mesh import vertex_areas
 from vermilion.sparse import CholeskyFactor
 
 _COTANGENT_RANGE = (0.02, 50.0)
@@ -42,6 +49,8 @@ class LayerIntegrator:
         free: (N,) ids of the vertices that may move.
         matrix: (N, N) of the system; `factor`: its Cholesky factor.
         weights: (M, 3) of the edges 12, 20, 01 of each mask triangle.
+        places: (N',) which of the mask's corners, ascending, have a place: those that may move.
+        place_weight: (N',) a / l^2 of each; none without `detail_mm`.
     """
 
     def __init__(
@@ -50,6 +59,7 @@ class LayerIntegrator:
         triangles: np.ndarray,
         mask: np.ndarray,
         seam_mm: float = 16.0,
+        detail_mm: float = 0.0,
     ):
         neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         domain = integration_domain(neutral_mm, triangles, mask, seam_mm)
@@ -64,26 +74,41 @@ class LayerIntegrator:
             len(neutral_mm),
         )
         hold = sparse.diags_array(domain.hold * stiffness.diagonal()[self.free])
-        self.matrix = sparse.csc_matrix(stiffness[self.free][:, self.free] + hold)
-        self.factor = CholeskyFactor(self.matrix)
         # The kernel sees only the corners of mask triangles; fixed ones go to a waste row.
-        self._local = np.unique(inside)
+        self._local = mesh_corners(triangles, self.mask)
         position = np.full(len(neutral_mm), len(self.free))
         position[self.free] = np.arange(len(self.free))
         self._row = position[self._local].astype(np.int32)
+        placed = self._row < len(self.free) if detail_mm > 0 else np.zeros(len(self._row), bool)
+        self.places = np.flatnonzero(placed)
+        areas = vertex_areas(neutral_mm, triangles)[self._local[self.places]]
+        self.place_weight = areas / detail_mm**2 if detail_mm > 0 else areas
+        diagonal = np.zeros(len(self.free))
+        diagonal[self._row[self.places]] = self.place_weight
+        hold = hold + sparse.diags_array(diagonal)
+        self.matrix = sparse.csc_matrix(stiffness[self.free][:, self.free] + hold)
+        self.factor = CholeskyFactor(self.matrix)
         self._corners = np.searchsorted(self._local, inside).astype(np.int32)
         self.weights = weights
 
-    def integrate(self, coarse: np.ndarray, layers: np.ndarray) -> np.ndarray:
+    def integrate(
+        self, coarse: np.ndarray, layers: np.ndarray, displacement_mm: np.ndarray | None = None
+    ) -> np.ndarray:
         """Corrected vertices, (F, V, 3) float64, by given layers: in double precision throughout.
 
         Args:
             coarse: (F, V, 3), in the layers' frame (the canonical head frame).
             layers: (F, M, 9).
+            displacement_mm: (F, N, 3) of the mask's corners, ascending; needed with `detail_mm`.
         """
         if layers.shape != (len(coarse), len(self.mask), 9):
             raise ValueError(
                 f"layers must be ({len(coarse)}, {len(self.mask)}, 9), got {layers.shape}"
+            )
+        if len(self.places) and np.shape(displacement_mm) != (len(coarse), len(self._local), 3):
+            raise ValueError(
+                f"displacement_mm must be ({len(coarse)}, {len(self._local)}, 3) with detail_mm, "
+                f"got {np.shape(displacement_mm)}"
             )
         frames_last = np.zeros((len(self.mask), 9, LANES))
 
@@ -91,11 +116,19 @@ class LayerIntegrator:
             given = layers[part]
             frames_last[..., : len(given)] = np.transpose(given, (1, 2, 0))
             accumulate(*self._triangles(points), frames_last, *_series(points.dtype), right)
+            if len(self.places):
+                wanted = np.transpose(displacement_mm[part][:, self.places], (1, 2, 0))
+                rows = self._row[self.places]
+                right[rows, :, : len(given)] += self.place_weight[:, None, None] * wanted
 
         return self._corrected(coarse, add_to, np.float64)
 
     def integrate_mixture(
-        self, coarse: np.ndarray, mixture: np.ndarray, basis: np.ndarray
+        self,
+        coarse: np.ndarray,
+        mixture: np.ndarray,
+        basis: np.ndarray,
+        place_basis: np.ndarray | None = None,
     ) -> np.ndarray:
         """Corrected vertices, (F, V, 3) float64, by the layers `mixture @ basis.T`.
 
@@ -106,6 +139,7 @@ class LayerIntegrator:
             coarse: (F, V, 3), in the canonical head frame.
             mixture: (F, R).
             basis: (M * 9, R), contiguous.
+            place_basis: (N' * 3, R) of `weighted_places`, contiguous; needed with `detail_mm`.
         """
         lanes = np.zeros((basis.shape[1], LANES), dtype=basis.dtype)
 
@@ -113,8 +147,16 @@ class LayerIntegrator:
             given = mixture[part]
             lanes[:, : len(given)] = given.T
             accumulate_mixture(*self._triangles(points), basis, lanes, *_series(basis.dtype), right)
+            if len(self.places):
+                add_places(self._row[self.places], place_basis, lanes, right)
 
         return self._corrected(coarse, add_to, basis.dtype)
+
+    def weighted_places(self, displacements_mm: np.ndarray) -> np.ndarray:
+        """(N' * 3, R): displacements (R, N * 3) of the mask's corners as the system weighs them."""
+        chosen = displacements_mm.reshape(len(displacements_mm), -1, 3)[:, self.places]
+        weighted = chosen * self.place_weight[:, None]
+        return np.ascontiguousarray(weighted.reshape(len(chosen), -1).T, dtype=np.float32)
 
     def _triangles(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
         return self._corners, self._row, self.weights.astype(points.dtype, copy=False), points

@@ -119,6 +119,16 @@ def accumulate_mixture(corners, row, weights, points, basis, mixture, series, li
         )
 
 
+@numba.njit(cache=True, nogil=True)
+def add_places(rows, basis, mixture, right):
+    """right[rows[i]] += basis @ mixture, basis (N * 3, R) and mixture (R, LANES)."""
+    made = np.dot(basis, mixture).reshape(len(rows), 3, LANES)
+    for i in range(len(rows)):
+        for k in range(3):
+            for f in range(LANES):
+                right[rows[i], k, f] += made[i, k, f]
+
+
 def turn_limits(dtype: np.dtype) -> np.ndarray:
     """(2,): factor and offset from a squared turn to s."""
     return np.array([2.0 / _LARGEST_TURN**2, 1.0], dtype=dtype)

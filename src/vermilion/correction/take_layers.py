@@ -1,4 +1,4 @@
-"""Correction layers of a stretch of a take (Lips16 4.2)."""
+"""Correction layers of a stretch of a take (Lips16 4.2), and where its vertices belong."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from vermilion.arrays import write_arrays
+from vermilion.correction.domain import mesh_corners
 from vermilion.correction.head import align_frames, head_from_world
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
@@ -124,14 +125,28 @@ def quality_rows(
     return replace(made, valid=valid), rows
 
 
+def displacements(made: TakeLayers, corners: np.ndarray) -> np.ndarray:
+    """From C to H at the vertices `corners` (N,), head frame, (F, N, 3) mm; zero where not valid."""
+    moved = (made.accurate_mm[:, corners] - made.coarse_mm[:, corners]).astype(np.float32)
+    return np.where(made.valid[:, None, None], moved, np.float32(0.0))
+
+
 def save_layers(
-    path: str | Path, made: TakeLayers, frames: Sequence[int], mask: np.ndarray
+    path: str | Path,
+    made: TakeLayers,
+    frames: Sequence[int],
+    mask: np.ndarray,
+    triangles: np.ndarray,
 ) -> None:
-    """Write frames (F,), layers (F, T, 9), mask (T,) and valid (F,) as `.npz`."""
+    """Write frames (F,), layers (F, T, 9), displacement_mm (F, N, 3), mask (T,) and valid (F,), `.npz`.
+
+    Displacements are those of the mask's corners, ascending (`mesh_corners`).
+    """
     write_arrays(
         path,
         frames=np.asarray(frames, dtype=np.int32),
         layers=made.layers,
+        displacement_mm=displacements(made, mesh_corners(triangles, mask)),
         mask=np.asarray(mask, dtype=np.int32),
         valid=made.valid,
     )

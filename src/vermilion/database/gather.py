@@ -28,12 +28,15 @@ def read_take_files(
 
     Args:
         row: subject, take, fps, split, and `train`, the frame numbers that train.
-        layer_paths, feature_paths: chunk files with `frames`, `valid` and `layers`, or `features` and `names`.
+        layer_paths, feature_paths: chunk files with `frames`, `valid` and `layers` with
+            `displacement_mm`, or `features` and `names`.
 
     Raises InputError where the chunks disagree about frames or features.
     """
     place = {"subject": row["subject"], "take": row["take"]}
-    layers = [_load(path, ("frames", "layers", "valid"), place) for path in layer_paths]
+    layers = [
+        _load(path, ("frames", "layers", "displacement_mm", "valid"), place) for path in layer_paths
+    ]
     features = [
         _load(path, ("frames", "features", "names", "valid"), place) for path in feature_paths
     ]
@@ -56,6 +59,7 @@ def read_take_files(
         frames=frames,
         features=np.where(valid[:, None], values, 0.0),
         layers=np.concatenate([part["layers"] for part in layers]),
+        displacement_mm=np.concatenate([part["displacement_mm"] for part in layers]),
         valid=valid,
         train=np.isin(frames, row["train"]),
     )

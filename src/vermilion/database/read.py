@@ -22,6 +22,7 @@ class LipDatabase:
         triangles: (T, 3) int32 topology of the coarse mesh.
         topology: its hash.
         mask: (M,) int32 ids of the triangles that the layers cover.
+        vertices: (N,) int32 ids of their corners, ascending.
         area_mm2: (M,) mean area of each over the subjects' neutrals.
         feature_names: names of the features.
         takes: (subject, take) pairs, sorted.
@@ -49,6 +50,7 @@ class LipDatabase:
         self.triangles = file["topology/triangles"][:]
         self.topology = str(file["topology/triangles"].attrs["sha256"])
         self.mask = file["mask/triangles"][:]
+        self.vertices = file["mask/vertices"][:]
         self.area_mm2 = file["mask/area_mm2"][:]
         self.feature_names = tuple(name.decode() for name in file["features/names"][:])
         self.takes = tuple((s, t) for s in sorted(file["takes"]) for t in sorted(file["takes"][s]))
@@ -78,6 +80,7 @@ class LipDatabase:
             frames=group["frames"][:],
             features=group["features"][:],
             layers=group["layers"][:],
+            displacement_mm=group["displacement_mm"][:],
             valid=group["valid"][:],
             train=group["train"][:],
         )
@@ -103,6 +106,7 @@ class LipDatabase:
         n_features, n_outputs = len(self.feature_names), len(self.mask) * 9
         features = np.empty((total, n_features), dtype=np.float32)
         layers = np.empty((total, n_outputs), dtype=np.float32)
+        displacements = np.empty((total, len(self.vertices) * 3), dtype=np.float32)
         frames = np.empty(total, dtype=np.int32)
         sequences = np.repeat(np.arange(len(chosen)), [len(r) for r in rows])
         first = 0
@@ -112,8 +116,9 @@ class LipDatabase:
             if len(part):
                 features[to] = group["features"][part]
                 layers[to] = group["layers"][part].reshape(len(part), -1)
+                displacements[to] = group["displacement_mm"][part].reshape(len(part), -1)
                 frames[to] = group["frames"][part]
             first += len(part)
         names = tuple(f"{s}/{t}" for s, t in chosen)
         neutrals = {s: self.neutral_mm(s) for s in sorted({s for s, _ in chosen})}
-        return TrainingSet(features, layers, sequences, names, frames, neutrals)
+        return TrainingSet(features, layers, displacements, sequences, names, frames, neutrals)

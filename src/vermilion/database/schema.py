@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 FORMAT = "vermilion-lip-database"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class TakeEntry:
         frames: (F,) int32 frame numbers, ascending.
         features: (F, M) float32.
         layers: (F, T, 9) float32 over the mask.
+        displacement_mm: (F, N, 3) float32 from C to H at the corners of the mask, head frame.
         valid: (F,) bool, both features and layers are good.
         train: (F,) bool, regressors may train on the frame.
     """
@@ -48,12 +49,13 @@ class TakeEntry:
     frames: np.ndarray
     features: np.ndarray
     layers: np.ndarray
+    displacement_mm: np.ndarray
     valid: np.ndarray
     train: np.ndarray
 
     def __post_init__(self) -> None:
         n_frames = len(self.frames)
-        for name in ("features", "layers", "valid", "train"):
+        for name in ("features", "layers", "displacement_mm", "valid", "train"):
             if len(getattr(self, name)) != n_frames:
                 raise ValueError(
                     f"{self.subject}/{self.take}: {name} has {len(getattr(self, name))} frames, "
@@ -68,6 +70,7 @@ class TrainingSet:
     Attributes:
         features: (F, M) float32.
         layers: (F, T * 9) float32.
+        displacements_mm: (F, N * 3) float32 at the corners of the mask.
         sequences: (F,) int index into `takes`.
         takes: names `subject/take`.
         frames: (F,) int32 frame numbers.
@@ -76,6 +79,7 @@ class TrainingSet:
 
     features: np.ndarray
     layers: np.ndarray
+    displacements_mm: np.ndarray
     sequences: np.ndarray
     takes: tuple[str, ...]
     frames: np.ndarray

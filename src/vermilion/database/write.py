@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 import vermilion
+from vermilion.correction.domain import mesh_corners
 from vermilion.correction.layers import NUMBERS
 from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.schema import FORMAT, FORMAT_VERSION, SubjectEntry, TakeEntry
@@ -57,7 +58,14 @@ def write_database(
         takes: their layers lie over their own subject's mask.
     """
     mask = common_mask(subjects, min_common_mask)
-    columns = {s.subject: np.searchsorted(s.mask, mask) for s in subjects}
+    corners = mesh_corners(triangles, mask)
+    columns = {
+        s.subject: (
+            np.searchsorted(s.mask, mask),
+            np.searchsorted(mesh_corners(triangles, s.mask), corners),
+        )
+        for s in subjects
+    }
     area = np.mean([triangle_areas(s.neutral_mm, triangles[mask]) for s in subjects], axis=0)
     # HDF5 would store the time of writing; without it the same input gives the same bytes.
     with atomic_path(path) as temporary, h5py.File(temporary, "w", track_order=False) as file:
@@ -71,6 +79,7 @@ def write_database(
         topology = _dataset(file, "topology/triangles", triangles.astype(np.int32))
         topology.attrs["sha256"] = topology_hash(triangles)
         _dataset(file, "mask/triangles", mask.astype(np.int32))
+        _dataset(file, "mask/vertices", corners.astype(np.int32))
         _dataset(file, "mask/area_mm2", area.astype(np.float64))
         _dataset(file, "features/names", np.array(list(feature_names), dtype="S"))
         _dataset(file, "layers/names", np.array(NUMBERS, dtype="S"))
@@ -81,7 +90,11 @@ def write_database(
 
 
 def _write_take(
-    file: h5py.File, entry: TakeEntry, columns: np.ndarray, n_features: int, compression: int
+    file: h5py.File,
+    entry: TakeEntry,
+    columns: tuple[np.ndarray, np.ndarray],
+    n_features: int,
+    compression: int,
 ) -> None:
     if entry.features.shape[1] != n_features:
         raise InputError(
@@ -99,10 +112,11 @@ def _write_take(
     _dataset(group, "features", entry.features.astype(np.float32))
     _dataset(group, "valid", entry.valid.astype(bool))
     _dataset(group, "train", entry.train.astype(bool))
-    layers = entry.layers[:, columns].astype(np.float32)
     options = {"compression": compression, "shuffle": True} if compression else {}
-    chunk = (min(16, len(layers)), *layers.shape[1:])
-    group.create_dataset("layers", data=layers, chunks=chunk, track_times=False, **options)
+    for name, chosen in zip(("layers", "displacement_mm"), columns, strict=True):
+        values = getattr(entry, name)[:, chosen].astype(np.float32)
+        chunk = (min(16, len(values)), *values.shape[1:])
+        group.create_dataset(name, data=values, chunks=chunk, track_times=False, **options)
 
 
 def _dataset(group: h5py.Group, name: str, data: np.ndarray) -> h5py.Dataset:

@@ -21,7 +21,7 @@ class CoarseTake:
         coarse_mm: (F, V, 3) world; triangles: (T, 3); neutral_mm: (V, 3) of the subject.
         rotation, translation_mm: `world_from_head`, (F, 3, 3) and (F, 3).
         features: (F, M); NaN where a frame has none.
-        seam_mm: of the integration.
+        seam_mm, detail_mm: of the integration.
     """
 
     coarse_mm: np.ndarray
@@ -31,6 +31,7 @@ class CoarseTake:
     translation_mm: np.ndarray
     features: np.ndarray
     seam_mm: float
+    detail_mm: float = 0.0
 
 
 def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
@@ -38,7 +39,7 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
 
     The factorisation, once a person, is not in the time. Frames without features stay as they are.
     """
-    corrector = Corrector(model, take.neutral_mm, take.triangles, take.seam_mm)
+    corrector = Corrector(model, take.neutral_mm, take.triangles, take.seam_mm, take.detail_mm)
     usable = np.isfinite(take.features).all(axis=1)
     pose = take.rotation[usable], take.translation_mm[usable]
     corrected = np.array(take.coarse_mm, dtype=np.float64)
@@ -53,12 +54,17 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
 
 
 def corrected_by_truth(
-    mask: np.ndarray, layers: np.ndarray, valid: np.ndarray, take: CoarseTake
+    mask: np.ndarray,
+    layers: np.ndarray,
+    displacement_mm: np.ndarray,
+    valid: np.ndarray,
+    take: CoarseTake,
 ) -> np.ndarray:
-    """The oracle: the true layers (F, T, 9) of the triangles `mask` (T,) integrated, (F, V, 3)."""
+    """The oracle: true layers (F, T, 9) of the triangles `mask` (T,) and displacements, (F, V, 3)."""
     return correct_with_layers(
         mask, layers, take.coarse_mm, take.triangles, take.neutral_mm, take.rotation,
         take.translation_mm, valid=valid, seam_mm=take.seam_mm,
+        displacement_mm=displacement_mm, detail_mm=take.detail_mm,
     )  # fmt: skip
 
 

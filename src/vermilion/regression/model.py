@@ -17,7 +17,9 @@ from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 
 FORMAT = "vermilion-regressor"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
+#: Displacement (mm) that weighs as much as 1 in a layer (rad), so that one basis serves both.
+DISPLACEMENT_UNIT_MM = 30.0
 #: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
 SAME_PERSON_MM = 0.05
 ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor, "kernel": KernelRegressor}
@@ -29,11 +31,13 @@ class LipModel:
 
     Attributes:
         name: regressor and variant (`PS-anna`, `MS-affine`, ...).
-        estimator: fitted; features (F, M') -> layers (F, T * 9).
+        estimator: fitted; features (F, M') -> layers (F, T * 9), then the displacements of the
+            mask's corners (F, N * 3) in units of DISPLACEMENT_UNIT_MM.
         feature_names: names of all M features of a frame.
         feature_columns: (M',) int, those that the estimator reads.
         mask: (T,) int32 triangle ids of the coarse mesh.
         topology: hash of the coarse topology.
+        vertices: (N,) int32 ids of the mask's corners, ascending; none for a model of layers alone.
         training_frames: `subject/take` -> (n,) frame numbers trained on.
         neutrals_mm: subject -> (V, 3) coarse neutral of each person with a bias of their own, in the
             order of the biases; empty for one shared bias.
@@ -48,10 +52,15 @@ class LipModel:
     mask: np.ndarray
     topology: str
     training_frames: dict[str, np.ndarray]
+    vertices: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     neutrals_mm: dict[str, np.ndarray] = field(default_factory=dict)
     novelty_limit: float = np.inf
     units: dict[str, str] = field(
-        default_factory=lambda: {"layers": "rad, 1", "features": "see feature_names"}
+        default_factory=lambda: {
+            "layers": "rad, 1",
+            "displacements": f"{DISPLACEMENT_UNIT_MM:g} mm",
+            "features": "see feature_names",
+        }
     )
 
     @property
@@ -78,16 +87,29 @@ class LipModel:
         """
         person = self.person_of(neutral_mm)
         flat = self.estimator.predict(self._chosen(features), person)
-        return flat.reshape(len(features), -1, 9)
+        return flat[:, : 9 * len(self.mask)].reshape(len(features), -1, 9)
+
+    def displacements_mm(
+        self, features: np.ndarray, neutral_mm: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Displacements (F, N, 3) from C, head frame, of features (F, M); as in `predict`."""
+        flat = self.estimator.predict(self._chosen(features), self.person_of(neutral_mm))
+        places = flat[:, 9 * len(self.mask) :].reshape(len(features), -1, 3)
+        return DISPLACEMENT_UNIT_MM * places
 
     def mixture(self, features: np.ndarray) -> np.ndarray:
         """Coefficients (F, R) of the layers' basis, of features (F, M)."""
         return self.estimator.mixture(self._chosen(features))
 
     def basis(self, neutral_mm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Basis (R, T, 9) and bias (T, 9): layers are `mixture @ basis + bias`."""
+        """Layers (R + 1, T * 9) and displacements (R + 1, N * 3) mm that `mixture` mixes.
+
+        The last row is the bias, of which every frame has one.
+        """
         bias = self.estimator.bias_of(self.person_of(neutral_mm))
-        return self.estimator.basis_.reshape(-1, len(self.mask), 9), bias.reshape(-1, 9)
+        rows = np.concatenate([self.estimator.basis_, bias[None]])
+        layers, places = np.split(rows, [9 * len(self.mask)], axis=1)
+        return layers, DISPLACEMENT_UNIT_MM * places
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
         """How far features (F, M) lie from what was trained on, (F,); see the estimators."""
@@ -136,6 +158,7 @@ def save_model(path: str | Path, model: LipModel) -> None:
         _put(file, "features/names", np.array(model.feature_names, dtype="S"))
         _put(file, "features/columns", np.asarray(model.feature_columns, dtype=np.int32))
         _put(file, "mask/triangles", np.asarray(model.mask, dtype=np.int32))
+        _put(file, "mask/vertices", np.asarray(model.vertices, dtype=np.int32))
         for index, (name, neutral) in enumerate(model.neutrals_mm.items()):
             _put(file, f"persons/{name}", np.asarray(neutral, dtype=np.float64))
             file[f"persons/{name}"].attrs["index"] = index
@@ -209,6 +232,7 @@ def _read(file: h5py.File) -> LipModel:
         feature_columns=file["features/columns"][:],
         mask=file["mask/triangles"][:],
         topology=str(file.attrs["topology_sha256"]),
+        vertices=file["mask/vertices"][:],
         training_frames=training,
         neutrals_mm={name: neutral[:] for name, neutral in persons},
         novelty_limit=float(file.attrs["novelty_limit"]),

@@ -22,7 +22,7 @@ from vermilion.regression.cross_validation import (
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
-from vermilion.regression.model import LipModel
+from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
 
 Kind = Literal["rbf", "affine", "kernel"]
 
@@ -133,15 +133,17 @@ def train(
     mask: np.ndarray,
     area_mm2: np.ndarray,
     topology: str,
+    vertices: np.ndarray,
     selection: Selection,
 ) -> tuple[LipModel, Curve]:
-    """Choose alpha and beta by cross-validation over clips, then fit on all of `data`.
+    """Choose alpha and beta by cross-validation of the layers over clips, then fit on all of `data`.
 
     Args:
         name: of the regressor, with its variant.
         data: rows of the database.
         mask, area_mm2: (T,) the layer's triangles and their areas, which weight the errors.
         topology: hash of the coarse topology.
+        vertices: (N,) corners of the mask, whose displacements are regressed with the layers.
     """
     kind, wanted = VARIANTS[split_name(name)[2]]
     kind = kind or selection.regressor
@@ -174,7 +176,9 @@ def train(
     estimator.set_params(alpha=float(curve.alphas[column]))
     if not np.isnan(curve.betas[row]):
         estimator.set_params(beta=float(curve.betas[row]))
-    estimator.fit(features, data.layers, data.sequences, persons)
+    places = data.displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
+    targets = np.concatenate([data.layers, places], axis=1)
+    estimator.fit(features, targets, data.sequences, persons)
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
     used = {
         take: data.frames[data.sequences == k]
@@ -188,6 +192,7 @@ def train(
         feature_columns=columns,
         mask=mask,
         topology=topology,
+        vertices=vertices,
         training_frames=used,
         neutrals_mm=data.neutrals_mm if persons is not None else {},
         novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
