@@ -83,6 +83,7 @@ def run_layers(root, subject, chunk):
             "coarse": take / f"tracking/C/{chunk}.npy",
             "fit": take / "tracking/fit.npz",
             "correspondence": root / f"subjects/{subject}/correspondence.npz",
+            "tracker": root / "face/tracker.npz",
         },
         output={
             "layers": take / f"correction/layers/{chunk}.npz",

@@ -19,7 +19,7 @@ from vermilion.correction.layers import (
     polar_decomposition,
 )
 from vermilion.correction.rotations import rotation_matrix, rotation_vector
-from vermilion.correction.take_layers import take_layers
+from vermilion.correction.take_layers import displacements, take_layers
 
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
 
@@ -45,32 +45,37 @@ def test_rigid_motion_gives_rotation_alone(vertices):
     np.testing.assert_allclose(layers[:, :3], [[0.4, -1.1, 0.3]] * 3, atol=1e-12)
 
 
+@pytest.mark.parametrize("region", ["rigid", "face"])
 @pytest.mark.parametrize("head", ["frame", "neutral"])
-def test_rigid_motion_of_the_head_gives_the_zero_layer(vertices, head):
+def test_rigid_motion_of_the_head_gives_the_zero_layer(head, region):
     """H is C seen by another tracker: each frame of either has a rigid motion of its own."""
-    n_frames = 4
+    n_frames, n_vertices = 4, 8
     rng = np.random.default_rng(11)
+    triangles = np.array([*TRIANGLES, [0, 3, 5], [5, 6, 7]])
+    vertices = rng.normal(scale=20.0, size=(n_vertices, 3))
     rotation = Rotation.from_rotvec(rng.normal(scale=0.8, size=(n_frames, 3))).as_matrix()
     translation = rng.normal(scale=200.0, size=(n_frames, 3))
-    shape = vertices + rng.normal(scale=4.0, size=(n_frames, *vertices.shape))
-    shape[0] = vertices
-    shape[:, :4] = vertices[:4]  # the part that does not move with expression
+    shape = np.tile(vertices, (n_frames, 1, 1))
+    shape[1:, 4] += rng.normal(scale=4.0, size=(n_frames - 1, 3))  # the only part that moves
     coarse = world_from_head(shape, rotation, translation)
     other = Rotation.from_rotvec(rng.normal(size=(n_frames, 3))).as_matrix()
     accurate = coarse @ np.swapaxes(other, 1, 2) + rng.normal(scale=90.0, size=(n_frames, 1, 3))
     correspondence = SimpleNamespace(
         on_coarse=lambda meshes: meshes,
-        rigid=np.arange(5) < 4,
-        coarse_triangles=TRIANGLES,
+        rigid=np.isin(np.arange(n_vertices), [0, 3, 6, 7]),
+        coarse_triangles=triangles,
         coarse_neutral_mm=vertices,
-        mask=np.arange(3),
+        mask=np.array([2]),
+        vertices=SimpleNamespace(bound=np.ones(n_vertices, dtype=bool)),
     )
     made = take_layers(
         correspondence, accurate, coarse, rotation, translation,
         head=head, accurate_neutral_mm=accurate[0],
+        face=np.ones(n_vertices, dtype=bool) if region == "face" else None,
     )  # fmt: skip
     assert made.valid.all()
     np.testing.assert_allclose(made.layers, 0.0, atol=1e-9)
+    np.testing.assert_allclose(displacements(made, np.arange(n_vertices)), 0.0, atol=1e-4)  # mm
 
 
 def test_no_difference_gives_the_zero_layer(vertices):

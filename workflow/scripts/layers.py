@@ -6,6 +6,7 @@ from vermilion.config.correction import LayersConfig
 from vermilion.correction.overlay import layers_overlay
 from vermilion.correction.take_layers import quality_rows, save_layers, take_layers
 from vermilion.correspondence.correspondence import Correspondence
+from vermilion.faces.model import FaceModel
 from vermilion.images import write_srgb8
 from vermilion.logfile import log_to
 from vermilion.quality import write_quality
@@ -31,6 +32,7 @@ def main(snakemake):
         fit.world_from_head_translation_mm[rows],
         head=cfg.head,
         accurate_neutral_mm=neutral,
+        face=FaceModel.load(inputs.tracker).regions["face"] if cfg.region == "face" else None,
     )
     checked, quality = quality_rows(
         made,

@@ -18,6 +18,13 @@ class LayersConfig(StageConfig):
         "aligned to the coarse mesh on the rigid region in every frame. `neutral`: its own head "
         "motion removed on that region, then aligned to the coarse mesh once, at the neutral.",
     )
+    region: Literal["rigid", "face"] = Field(
+        "rigid",
+        description="What the accurate mesh is aligned by. `rigid`: forehead, temples and bridge of the "
+        "nose, as far as they fit. `face`: all of the face outside the mask, by area, as the evaluation "
+        "aligns; displacements then take up more of the tracker's own errors, which are those of one "
+        "camera: better on its held-out frames, worse in the picture and under another camera.",
+    )
     max_alignment_mm: float = Field(
         6.0,
         gt=0.0,

@@ -25,7 +25,7 @@ def world_from_head(
 
 
 def align_frames(
-    sequence_mm: np.ndarray, target_mm: np.ndarray, chosen: np.ndarray, trim: float = 0.2
+    sequence_mm: np.ndarray, target_mm: np.ndarray, weight: np.ndarray, trim: float = 0.2
 ) -> tuple[np.ndarray, np.ndarray]:
     """Bring each frame rigidly onto its target by some of the vertices.
 
@@ -35,23 +35,24 @@ def align_frames(
     Args:
         sequence_mm: (F, V, 3).
         target_mm: (F, V, 3) or (V, 3).
-        chosen: (V,) bool.
+        weight: (V,) of each vertex in the least squares, bool or float; 0 leaves it out.
+        trim: 0 for once, with all vertices.
 
     Returns:
         ((F, V, 3) aligned, (F,) RMS mm of the vertices kept). NaN where a frame is not finite.
     """
-    target = np.broadcast_to(target_mm, sequence_mm.shape)
+    target, chosen = np.broadcast_to(target_mm, sequence_mm.shape), np.asarray(weight) > 0
     aligned = np.full(sequence_mm.shape, np.nan)
     error_mm = np.full(len(sequence_mm), np.nan)
     for f in range(len(sequence_mm)):
         source, goal = sequence_mm[f, chosen], target[f, chosen]
         if not (np.isfinite(source).all() and np.isfinite(goal).all()):
             continue
-        weights = np.ones(len(source))
-        for _ in range(2):
+        weights = np.asarray(weight, dtype=float)[chosen]
+        for _ in range(2 if trim > 0 else 1):
             rotation, translation = rigid_alignment(source, goal, weights)
             residual = np.linalg.norm(source @ rotation.T + translation - goal, axis=1)
             error_mm[f] = np.sqrt(np.average(residual**2, weights=weights))
-            weights = (residual <= np.quantile(residual, 1.0 - trim)).astype(float)
+            weights = weights * (residual <= np.quantile(residual, 1.0 - trim))
         aligned[f] = sequence_mm[f] @ rotation.T + translation
     return aligned, error_mm

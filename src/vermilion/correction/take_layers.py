@@ -14,6 +14,7 @@ from vermilion.correction.domain import mesh_corners
 from vermilion.correction.head import align_frames, head_from_world
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
+from vermilion.mesh import vertex_areas
 from vermilion.quality import QualityRow
 
 
@@ -48,6 +49,7 @@ def take_layers(
     *,
     head: Literal["frame", "neutral"] = "frame",
     accurate_neutral_mm: np.ndarray | None = None,
+    face: np.ndarray | None = None,
 ) -> TakeLayers:
     """Layers that turn **C** into **H**, free of head motion.
 
@@ -58,16 +60,20 @@ def take_layers(
         head: `frame` aligns H to C on the rigid region in every frame; `neutral` aligns H to its
             own neutral, and that to C's neutral once.
         accurate_neutral_mm: (V_H, 3), needed for `neutral`.
+        face: (V,) bool, the face of C: H is aligned on all of it outside the mask, by area, as the
+            evaluation does. None: on the rigid region, without the fifth of it that fits worst.
     """
     coarse = head_from_world(coarse_mm, rotation, translation_mm)
     accurate = correspondence.on_coarse(np.asarray(accurate_mm))
-    rigid = correspondence.rigid
+    fixed, trim = correspondence.rigid, 0.2
+    if face is not None:
+        fixed, trim = _face_outside_mask(correspondence, face), 0.0
     if head == "frame":
-        accurate, alignment_mm = align_frames(accurate, coarse, rigid)
+        accurate, alignment_mm = align_frames(accurate, coarse, fixed, trim)
     else:
         neutral = correspondence.on_coarse(accurate_neutral_mm)
-        neutral, _ = align_frames(neutral[None], correspondence.coarse_neutral_mm, rigid)
-        accurate, alignment_mm = align_frames(accurate, neutral[0], rigid)
+        neutral, _ = align_frames(neutral[None], correspondence.coarse_neutral_mm, fixed, trim)
+        accurate, alignment_mm = align_frames(accurate, neutral[0], fixed, trim)
     triangles = correspondence.coarse_triangles[correspondence.mask]
     corners = np.unique(triangles)
     valid = np.isfinite(accurate[:, corners]).all(axis=(1, 2))
@@ -85,6 +91,14 @@ def take_layers(
         strength=np.sqrt((layers.astype(np.float64) ** 2).mean(axis=(1, 2))),
         folded=(turn > np.pi / 2).mean(axis=1),
     )
+
+
+def _face_outside_mask(correspondence: Correspondence, face: np.ndarray) -> np.ndarray:
+    """Area (V,) mm2 of the bound vertices of the face outside the mask; 0 elsewhere."""
+    triangles = correspondence.coarse_triangles
+    chosen = face & correspondence.vertices.bound
+    chosen[mesh_corners(triangles, correspondence.mask)] = False
+    return np.where(chosen, vertex_areas(correspondence.coarse_neutral_mm, triangles), 0.0)
 
 
 def quality_rows(
