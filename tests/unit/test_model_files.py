@@ -241,19 +241,20 @@ def test_training_chooses_writes_and_reads(database, tmp_path):
     with LipDatabase(database) as read:
         data = read.training_set(["ana", "bo"])
         place = (read.feature_names, read.mask, read.area_mm2, read.topology, read.vertices)
-    for name in ("MS", "MS-affine", "MS-rbf", "MS-shape-only", "MS-distances-only"):
+    for name in ("MS", "MS-affine", "MS-rbf", "MS-shape-only", "MS-distances-only", "MS-paper"):
         trained, curve = train(name, data, *place, Selection(folds=3, clip_frames=6))
         save_model(tmp_path / f"{name}.h5", trained)
         read = load_model(tmp_path / f"{name}.h5")
         assert read.predict(data.features, neutral(1)).shape == (38, 3, 9)
-        assert read.displacements_mm(data.features, neutral(1)).shape == (38, 6, 3)
+        n_places = 0 if name == "MS-paper" else 6
+        assert read.displacements_mm(data.features, neutral(1)).shape == (38, n_places, 3)
         mixture = np.column_stack([read.mixture(data.features), np.ones(38)])
         layers, displacements_mm = read.basis(neutral(1))
         np.testing.assert_allclose(
             (mixture @ layers).reshape(38, 3, 9), read.predict(data.features, neutral(1)), atol=1e-5
         )
         np.testing.assert_allclose(
-            (mixture @ displacements_mm).reshape(38, 6, 3),
+            (mixture @ displacements_mm).reshape(38, n_places, 3),
             read.displacements_mm(data.features, neutral(1)), atol=1e-4,
         )  # fmt: skip
         table = curve_table(name, curve)

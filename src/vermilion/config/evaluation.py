@@ -100,10 +100,12 @@ class EvaluationConfig(StageConfig):
     reference: ReferenceConfig = Field(
         default_factory=ReferenceConfig, description="How a vertex finds its counterpart."
     )
-    variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only"]] = Field(
-        [],
-        description="Variants of the regressors to train and evaluate beside them: another estimator, "
-        "or the configured one on some of the features.",
+    variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only", "paper"]] = (
+        Field(
+            [],
+            description="Variants of the regressors to train and evaluate beside them: another estimator, "
+            "the configured one on some of the features, or the paper's network with layers alone.",
+        )
     )
     measures: MeasuresConfig = Field(
         default_factory=MeasuresConfig, description="Figures and their intervals."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -34,6 +34,7 @@ VARIANTS: dict[str, tuple[Kind | None, str]] = {
     "kernel": ("kernel", "all"),
     "shape-only": (None, "shape"),
     "distances-only": (None, "distances"),
+    "paper": ("rbf", "all"),
 }
 
 
@@ -80,6 +81,10 @@ class Selection:
             prototype_minimum=self.prototype_minimum,
             **shared,
         )
+
+    def as_in_the_paper(self) -> Selection:
+        """Lips16 5.2 to the letter: one bias, no limit to the features, the least error."""
+        return replace(self, bias="shared", reach=1e9, choice="least")
 
     def grid(self, kind: Kind) -> dict[str, list[float] | None]:
         """`alphas` and `betas` to try, ascending."""
@@ -143,10 +148,16 @@ def train(
         data: rows of the database.
         mask, area_mm2: (T,) the layer's triangles and their areas, which weight the errors.
         topology: hash of the coarse topology.
-        vertices: (N,) corners of the mask, whose displacements are regressed with the layers.
+        vertices: (N,) corners of the mask, whose displacements are regressed with the layers (but for
+            the variant `paper`, which is the paper's in all).
     """
-    kind, wanted = VARIANTS[split_name(name)[2]]
+    variant = split_name(name)[2]
+    kind, wanted = VARIANTS[variant]
     kind = kind or selection.regressor
+    displacements_mm = data.displacements_mm
+    if variant == "paper":
+        selection, vertices = selection.as_in_the_paper(), vertices[:0]
+        displacements_mm = displacements_mm[:, :0]
     kinds = np.array([feature_group(feature) for feature in feature_names])
     columns = np.flatnonzero((kinds == wanted) | (wanted == "all"))
     if not len(columns):
@@ -176,7 +187,7 @@ def train(
     estimator.set_params(alpha=float(curve.alphas[column]))
     if not np.isnan(curve.betas[row]):
         estimator.set_params(beta=float(curve.betas[row]))
-    places = data.displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
+    places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
     targets = np.concatenate([data.layers, places], axis=1)
     estimator.fit(features, targets, data.sequences, persons)
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
