@@ -173,11 +173,13 @@ def test_registration_finds_the_bent_surface(surfaces):
 
 def test_correspondence_and_its_file(surfaces, tmp_path):
     coarse, fine, on_coarse, on_fine, truth = surfaces
+    eye = coarse.vertices_mm[[np.argmin(np.abs(coarse.vertices_mm - [30, 20, 0]).sum(axis=1))]]
     found, _ = find_correspondence(
-        coarse, fine, on_coarse, on_fine, np.zeros(3), mask_radius_mm=50.0
+        coarse, fine, on_coarse, on_fine, np.zeros(3), eye, mask_radius_mm=50.0, eye_gap_mm=9.0
     )
     corners = coarse.vertices_mm[coarse.triangles[found.mask]]
     assert np.linalg.norm(corners, axis=2).max() <= 50.0
+    assert np.linalg.norm(corners - eye, axis=2).min() > 9.0
     in_mask = np.unique(coarse.triangles[found.mask])
     assert not found.rigid[in_mask].any()
     error = np.linalg.norm(found.on_coarse(fine.vertices_mm) - truth, axis=1)

@@ -54,3 +54,10 @@ class CorrespondenceConfig(StageConfig):
         description="Reach of the correction layer from the middle of the mouth (mm). The face "
         "outside stays where the tracker put it, which bounds what a correction can gain.",
     )
+    eye_gap_mm: float = Field(
+        10.0,
+        ge=0.0,
+        le=60.0,
+        description="The correction layer keeps this far from the eyelids' landmarks (mm): lips say "
+        "nothing of blinks.",
+    )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
 
 from vermilion.arrays import read_arrays, write_arrays
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
@@ -107,10 +108,12 @@ def find_correspondence(
     landmarks_coarse: SurfaceMap,
     landmarks_accurate: SurfaceMap,
     mouth_centre_mm: np.ndarray,
+    eyelids_mm: np.ndarray,
     *,
     coarse_regions: Mapping[str, np.ndarray] | None = None,
     accurate_regions: Mapping[str, np.ndarray] | None = None,
     mask_radius_mm: float = 95.0,
+    eye_gap_mm: float = 10.0,
     max_distance_mm: float = 4.0,
     max_angle_deg: float = 70.0,
     **registration,
@@ -124,8 +127,10 @@ def find_correspondence(
         accurate: H at the neutral, in any frame.
         landmarks_coarse, landmarks_accurate: the same landmarks on both meshes.
         mouth_centre_mm: (3,) in C's frame.
+        eyelids_mm: (N, 3) points in C's frame from which the mask keeps away; there may be none.
         coarse_regions, accurate_regions: regions of `FaceModel`, or None for another tracker's mesh.
         mask_radius_mm: the mask's reach from the mouth's centre.
+        eye_gap_mm: the mask's distance from points of the eyelids.
         max_distance_mm: between a registered vertex and its point of H.
         registration: further settings of `register`.
 
@@ -164,7 +169,9 @@ def find_correspondence(
     matched = (
         whole & (triangles.triangle >= 0) & ~flipped_triangles(vertices, coarse.triangles, accurate)
     )
-    mask = mouth_mask(coarse, mouth_centre_mm, mask_radius_mm, matched, coarse_regions)
+    mask = mouth_mask(
+        coarse, mouth_centre_mm, mask_radius_mm, eyelids_mm, eye_gap_mm, matched, coarse_regions
+    )
     in_mask = np.zeros(len(distance), dtype=bool)
     in_mask[coarse.triangles[mask]] = True
     rest = vertices.bound & ~in_mask
@@ -187,16 +194,21 @@ def mouth_mask(
     coarse: Mesh,
     mouth_centre_mm: np.ndarray,
     radius_mm: float,
+    eyelids_mm: np.ndarray,
+    eye_gap_mm: float,
     matched: np.ndarray,
     regions: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Ids of the matched triangles within `radius_mm` of the mouth's centre, in one piece.
 
     Args:
+        eyelids_mm, eye_gap_mm: no vertex lies as near to one of these points (N, 3).
         matched: (T,) bool, triangles whose corners are bound.
         regions: with them, the inside of the mouth, teeth and eyes are left out.
     """
     near = np.linalg.norm(coarse.vertices_mm - mouth_centre_mm, axis=1) <= radius_mm
+    if len(eyelids_mm):
+        near &= cKDTree(eyelids_mm).query(coarse.vertices_mm)[0] > eye_gap_mm
     if regions is not None:
         near &= ~(regions["mouth_inner"] | regions["teeth"] | regions["eyes"])
     inside = np.flatnonzero(near[coarse.triangles].all(axis=1) & matched)

@@ -12,6 +12,7 @@ from vermilion.raycast import RayCaster
 #: Points of the 66-point scheme that mark the face's outline: they slide over the surface.
 JAW = np.arange(17)
 LIPS = np.arange(48, 66)
+EYES = np.arange(36, 48)
 
 
 def back_project(

@@ -10,7 +10,7 @@ from vermilion.camera import Camera
 from vermilion.correction.head import head_from_world
 from vermilion.correspondence.binding import flipped_triangles
 from vermilion.correspondence.correspondence import Correspondence, find_correspondence
-from vermilion.correspondence.landmarks import LIPS, back_project, inner_features
+from vermilion.correspondence.landmarks import EYES, LIPS, back_project, inner_features
 from vermilion.correspondence.surface_map import SurfaceMap, at_vertices, closest_barycentric
 from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
@@ -117,7 +117,8 @@ def correspond_neutrals(
             coarse.vertices_mm[None], neutral.rotation[None], neutral.translation_mm[None]
         )[0]
     )
-    lips = seen[0].sample(in_head.vertices_mm, coarse.triangles)[LIPS]
+    points = seen[0].sample(in_head.vertices_mm, coarse.triangles)
+    lips, lids = points[LIPS], points[EYES]
     place = {"subject": neutral.subject, "take": neutral.take}
     if not np.isfinite(lips).all(axis=1).any():
         raise InputError(
@@ -132,6 +133,7 @@ def correspond_neutrals(
             accurate,
             *seen,
             np.nanmean(lips, axis=0),
+            lids[np.isfinite(lids).all(axis=1)],
             coarse_regions=tracker.regions,
             accurate_regions=template.regions,
             max_distance_mm=max_distance_mm,
