@@ -6,7 +6,8 @@ The studio renders one take of the `ict` model twice from the same curves: ten c
 (and a `plain` take), and the frontal camera truly without it. The stages run on the tattooed pictures
 with nothing but pictures to go by. NETWORKS is the folder of the landmark networks, PERFORMANCE_CSV a
 Live Link Face recording, FIRST_ROW where the 30 frames begin in it (every third row: 10 a second).
-FOLDER keeps everything; an interrupted run goes on where it was. About six minutes of one core.
+FOLDER keeps everything; an interrupted run goes on where it was. About six minutes of one core,
+rendering included.
 
 Prints, and writes to FOLDER/inpaint.tsv:
 
@@ -14,8 +15,9 @@ Prints, and writes to FOLDER/inpaint.tsv:
   all: ours with each shading; `Telea` (cv2.inpaint with the exact mask of the tattoo's pixels);
   `cross-fade` and `clone` (the plain picture's lips moved by the similarity of the true lip landmarks
   and blended in, or cv2.seamlessClone); `noise`, two bare pictures with different sensor noise;
-- mm between the tracker's mouth on inpainted and on truly bare frames, same identity; the same between
-  bare frames of different sensor noise.
+- mm between the tracker's mouth on inpainted and on truly bare frames, same identity, weighted by area,
+  after a rigid alignment of each frame on the rest of the face; the same between bare frames of different
+  sensor noise.
 
 Pictures for the eye: FOLDER/pictures/<frame>.png, columns tattooed, ours, truth, error (8 times), peers.
 """
@@ -37,6 +39,8 @@ from vermilion.camera import Camera, read_cameras, write_cameras
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.studio import StudioConfig, StudioTake
 from vermilion.draw import label, to_display
+from vermilion.evaluation.alignment import align_frames, moved
+from vermilion.evaluation.masks import regions_of_mask
 from vermilion.faces.model import FaceModel
 from vermilion.images import read_image
 from vermilion.inpaint.domain import lip_domain
@@ -213,7 +217,6 @@ def peers(scene: Scene, frame: int, inked: np.ndarray, mask: np.ndarray) -> dict
     moved = cv2.warpAffine(to_display(scene.plain), similarity, size, flags=cv2.INTER_CUBIC)
     alpha = cv2.GaussianBlur(mask.astype(np.float32) / 255, (0, 0), 1.0)[..., None]
     faded = np.rint(moved * alpha + inked * (1 - alpha)).astype(np.uint8)
-    x, y, w, h = cv2.boundingRect(mask)
     wide = cv2.dilate(mask, np.ones((5, 5)))
     x, y, w, h = cv2.boundingRect(wide)
     clone = cv2.seamlessClone(moved, inked, wide, (x + w // 2, y + h // 2), cv2.NORMAL_CLONE)
@@ -282,20 +285,21 @@ def measure_tracks(scene: Scene) -> None:
     """Distance between the meshes C of takes with the same motion and identity."""
     model = FaceModel.load(scene.results / "face/tracker.npz")
     meshes = {
-        take: read_sequence(scene.results / f"takes/p1/{take}/tracking/C/{scene.chunk}.npy")
+        take: np.asarray(
+            read_sequence(scene.results / f"takes/p1/{take}/tracking/C/{scene.chunk}.npy")
+        )
         for take in ("rom", "bare", "bare2")
     }
     bound = np.load(scene.results / "subjects/p1/correspondence.npz")
-    mouth = np.zeros(model.n_vertices, dtype=bool)
-    mouth[model.triangles[bound["mask"]]] = True
-    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
-    print(
-        "\nmm between C on truly bare frames and on\tmouth mask\tvermilion\tworst frame (vermilion)"
-    )
+    regions = regions_of_mask(model, bound["coarse_neutral_mm"], bound["mask"])
+    print("\nmm between C on truly bare frames and on\tmouth mask\tits worst frame\tvermilion")
     for name, take in (("inpainted", "rom"), ("bare, other noise", "bare2")):
-        apart = np.linalg.norm(np.asarray(meshes[take]) - meshes["bare"], axis=2)
-        worst = apart[:, lips].mean(axis=1).max()
-        print(f"{name}\t{apart[:, mouth].mean():.3f}\t{apart[:, lips].mean():.3f}\t{worst:.3f}")
+        aligned = moved(meshes[take], *align_frames(meshes[take], meshes["bare"], regions.rest))
+        apart = np.linalg.norm(aligned - meshes["bare"], axis=2)
+        mouth, lips = (
+            apart @ (w / w.sum()) for w in map(regions.weights.get, ("mouth", "vermilion"))
+        )
+        print(f"{name}\t{mouth.mean():.3f}\t{mouth.max():.3f}\t{lips.mean():.3f}")
 
 
 def main() -> None:

@@ -25,6 +25,8 @@ _SHADES = (1.0, 0.75, 0.5)
 #: Bins of display colours a channel, and the Gaussian that smooths them.
 _N_BINS = 40
 _BLUR_BINS = 0.5
+#: Openings no wider than this are closed, in rows of the grid (half a pixel at least).
+_SLIT = 2.0
 #: Gaussian along a contour, in columns of the grid.
 _BLUR_COLUMNS = 1.5
 
@@ -140,6 +142,10 @@ def find_opening(
         ends = np.minimum(columns - columns[0], columns[-1] - columns) * step_mm < evidence.clear_mm
         score = np.where(_beyond_lips(lip[:, columns]) | ends, 1.0, score)
         upper, lower = _best_contours(score, upper, lower, step_mm, evidence)
+        # A slit of one step is ink in the shadow between the lips.
+        middle = 0.5 * (upper + lower)
+        slit = lower - upper <= _SLIT
+        upper, lower = np.where(slit, middle, upper), np.where(slit, middle, lower)
         # Steps of the grid are no steps of a lip.
         upper, lower = (gaussian_filter1d(edge, _BLUR_COLUMNS) for edge in (upper, lower))
     return Opening(
