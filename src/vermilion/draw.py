@@ -11,7 +11,7 @@ import numpy as np
 from vermilion.camera import Camera
 from vermilion.images import linear_to_srgb
 from vermilion.mesh import vertex_normals
-from vermilion.raycast import RayCaster, interpolate
+from vermilion.raycast import Hits, RayCaster, interpolate
 
 _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
 
@@ -59,6 +59,19 @@ def draw_mesh(
     `colours` (V, 3) in [0, 1]; light grey by default.
     """
     hits = RayCaster(vertices_mm, triangles).see(camera)
+    return paint_mesh(picture, camera, hits, vertices_mm, triangles, colours, opacity)
+
+
+def paint_mesh(
+    picture: np.ndarray,
+    camera: Camera,
+    hits: Hits,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    colours: np.ndarray | None = None,
+    opacity: float = 1.0,
+) -> np.ndarray:
+    """`draw_mesh` with what the camera sees of the mesh already known."""
     normals = interpolate(hits, triangles, vertex_normals(vertices_mm, triangles))
     _, directions = camera.rays(camera.pixel_grid())
     facing = np.abs((normals * directions).sum(axis=-1))

@@ -47,6 +47,23 @@ def _open_sequence(path: str | Path) -> np.ndarray:
     return vertices
 
 
+def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
+    """Frame numbers of chunk files `<first>-<last>.<suffix>` in their order."""
+    spans = [[int(number) for number in Path(path).stem.split("-")] for path in paths]
+    return np.concatenate([np.arange(first, last + 1) for first, last in spans])
+
+
+def locate(paths: Sequence[str | Path], frames: Sequence[int]) -> dict[int, tuple[str | Path, int]]:
+    """Frame number -> (chunk file `<first>-<last>.<suffix>`, its row there)."""
+    wanted = {int(frame) for frame in frames}
+    return {
+        int(frame): (path, row)
+        for path in paths
+        for row, frame in enumerate(frames_of([path]))
+        if int(frame) in wanted
+    }
+
+
 def write_ply(path: str | Path, mesh: Mesh, colours: np.ndarray | None = None) -> None:
     """Write a binary PLY; `colours` (V, 3) uint8 optional."""
     n_vertices, n_triangles = len(mesh.vertices_mm), len(mesh.triangles)

@@ -26,7 +26,7 @@ AFTER_INPAINT = AFTER_TRACKING | {
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
     "landmarks_views", "multiview_neutral", "multiview_anchor", "multiview_clip",
-    "multiview_track", "multiview_refine",
+    "multiview_track", "multiview_refine", "multiview_drift", "multiview_report",
 }  # fmt: skip
 
 

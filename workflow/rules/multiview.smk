@@ -177,3 +177,83 @@ rule multiview_refine:
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
         "../scripts/multiview_refine.py"
+
+
+rule multiview_drift:
+    """Compares each frame of a chunk with the neutral's pictures, carried by the mesh: drift/{chunk}.tsv."""
+    input:
+        template=R + "/face/template.npz",
+        cameras=R + "/takes/{subject}/{take}/cameras",
+        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        meshes=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",
+        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
+    output:
+        drift=R + "/takes/{subject}/{take}/multiview/drift/{chunk}.tsv",
+    log:
+        R + "/logs/multiview_drift/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/multiview_drift/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("multiview.images", "multiview.drift"),
+        code=code_of("multiview_drift"),
+        source=source_of,
+        neutral=lambda wildcards: take_of(wildcards).first,
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+    script:
+        "../scripts/multiview_drift.py"
+
+
+def if_tracked(pattern):
+    """Input function: `pattern`, for every chunk, of a take with H; nothing of a neutral alone."""
+    return lambda wildcards: (
+        list(dict.fromkeys(per_chunk(pattern)(wildcards)))
+        if take_of(wildcards).role == "tattoo"
+        else []
+    )
+
+
+rule multiview_report:
+    """Shows how well each frame of a take is known, and where to look: report.html, drift.tsv."""
+    input:
+        template=R + "/face/template.npz",
+        cameras=R + "/takes/{subject}/{take}/cameras",
+        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        manifests=if_tracked(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        track=if_tracked(R + "/takes/{subject}/{take}/multiview/track.npz"),
+        meshes=if_tracked(R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"),
+        visibility=if_tracked(R + "/takes/{subject}/{take}/multiview/visibility/{chunk}.npy"),
+        quality=if_tracked(R + "/takes/{subject}/{take}/multiview/quality/{chunk}.tsv"),
+        drift=if_tracked(R + "/takes/{subject}/{take}/multiview/drift/{chunk}.tsv"),
+    output:
+        page=report(
+            R + "/takes/{subject}/{take}/multiview/report.html",
+            category="Reconstruction",
+            labels={"take": "{subject}/{take}"},
+            caption="../report/reconstruction.rst",
+        ),
+        drift=R + "/takes/{subject}/{take}/multiview/drift.tsv",
+    log:
+        R + "/logs/multiview_report/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/multiview_report/{subject}-{take}.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        cfg=cfg_of(
+            "multiview.images",
+            "multiview.stereo",
+            "multiview.refine",
+            "multiview.drift",
+            "multiview.report",
+        ),
+        code=code_of("multiview_report"),
+        source=source_of,
+        neutral=lambda wildcards: take_of(wildcards).first,
+    script:
+        "../scripts/multiview_report.py"

@@ -7,10 +7,15 @@ therefore wanted through its first output; `verify` removes all outputs of a job
 #: Role -> outputs a take: those with {chunk} are wanted for every chunk.
 TAKE_OUTPUTS = {
     ("tattoo", "plain", "video"): ("capture/{chunk}.json", "cameras"),
-    ("tattoo", "plain"): ("landmarks/views_neutral.npz", "multiview/neutral.npz"),
+    ("tattoo", "plain"): (
+        "landmarks/views_neutral.npz",
+        "multiview/neutral.npz",
+        "multiview/report.html",
+    ),
     ("tattoo",): (
         "multiview/track.npz",
         "multiview/H/{chunk}.npy",
+        "multiview/drift/{chunk}.tsv",
         "inpaint/reference.exr",
         "inpaint/{chunk}",
         "correction/layers/{chunk}.npz",

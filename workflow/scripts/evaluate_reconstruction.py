@@ -6,7 +6,7 @@ from vermilion.camera import read_cameras
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.closest import Surface
-from vermilion.evaluation.files import frames_of, save_sums
+from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
@@ -15,7 +15,7 @@ from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
 from vermilion.mesh import vertex_normals
-from vermilion.sequences import read_sequence
+from vermilion.sequences import frames_of, read_sequence
 from vermilion.tables import write_table
 
 

@@ -201,6 +201,55 @@ class RefineConfig(StageConfig):
     )
 
 
+class DriftConfig(StageConfig):
+    """Drift against the anchor: the neutral's pictures carried to each frame by its mesh."""
+
+    scale: float = Field(
+        0.5,
+        gt=0.05,
+        le=1.0,
+        description="Size of the compared pictures against the originals (ratio).",
+    )
+    min_agreement: float = Field(
+        0.3, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
+    )
+    ray_stride_px: int = Field(
+        2, ge=1, le=8, description="Distance of the rays that carry a picture (px)."
+    )
+
+
+class ReportConfig(StageConfig):
+    """The report page of a take."""
+
+    spaced_frames: int = Field(
+        3,
+        ge=0,
+        le=50,
+        description="Frames shown at even distances, besides the neutral and the worst ones.",
+    )
+    flagged_frames: int = Field(
+        2, ge=0, le=50, description="Flagged frames shown, those of the largest drift first."
+    )
+    picture_px: int = Field(
+        200, ge=80, le=800, description="Width and height of a picture of a sheet (px)."
+    )
+    residual_px: float = Field(
+        1.0, gt=0, le=20, description="Residual of the hottest colour (px of the originals)."
+    )
+    cloud_mm: float = Field(
+        0.5,
+        gt=0,
+        le=10,
+        description="Distance of a stereo point from the mesh at the ends of the colours (mm).",
+    )
+    page_mb: float = Field(
+        12.0,
+        gt=0.1,
+        le=200,
+        description="Size of the page; sheets are made smaller to keep to it (MB).",
+    )
+
+
 class MultiviewConfig(StageConfig):
     """From calibrated cameras to **H**, the registered high-quality mesh sequence."""
 
@@ -214,6 +263,12 @@ class MultiviewConfig(StageConfig):
     )
     refine: RefineConfig = Field(
         default_factory=RefineConfig, description="Registration of each frame to the neutral."
+    )
+    drift: DriftConfig = Field(
+        default_factory=DriftConfig, description="Drift of each frame against the neutral."
+    )
+    report: ReportConfig = Field(
+        default_factory=ReportConfig, description="The report page of a take."
     )
 
     @model_validator(mode="after")

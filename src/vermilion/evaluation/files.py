@@ -9,7 +9,7 @@ import numpy as np
 
 from vermilion.arrays import read_arrays, write_arrays
 from vermilion.evaluation.errors import ClipSums
-from vermilion.sequences import read_sequence
+from vermilion.sequences import frames_of, read_sequence
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
@@ -41,12 +41,6 @@ def load_sums(path: str | Path) -> tuple[dict[str, ClipSums], int]:
         regressor, name = key.split(":", 1)
         sums.setdefault(regressor, {})[name] = values
     return {regressor: ClipSums(values) for regressor, values in sums.items()}, n_frames
-
-
-def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
-    """Frame numbers of chunk files `<first>-<last>.<suffix>` in their order."""
-    spans = [[int(number) for number in Path(path).stem.split("-")] for path in paths]
-    return np.concatenate([np.arange(first, last + 1) for first, last in spans])
 
 
 def read_frames(paths: Sequence[str | Path], frames: np.ndarray) -> np.ndarray:

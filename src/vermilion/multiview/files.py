@@ -126,6 +126,12 @@ def read_track(path: str | Path, frames: Sequence[int]) -> np.ndarray:
     return arrays["coarse_mm"][[index[number] for number in frames]]
 
 
+def read_anchors(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(frames (F,), similarity (F,), anchors (F,) bool) of a track."""
+    arrays = _load(path, ("frames", "similarity", "anchors"))
+    return arrays["frames"], arrays["similarity"], arrays["anchors"]
+
+
 def _save(path, **arrays) -> None:
     write_arrays(path, **arrays)
 
