@@ -1,8 +1,9 @@
 """Refinement of a rig whose calibration is off, from the pictures of the take themselves.
 
 Features are matched near the epipolar lines of the given poses, the poses adjusted over their
-tracks, and the matching repeated with the better poses. Part of the tracks is held out: what is
-said of the result is measured on these.
+tracks, and the matching repeated with the better poses. Patches of the surface round the points,
+matched by least squares, bring the observations and with them the poses to a small part of a pixel.
+Part of the tracks is held out: what is said of the result is measured on these.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vermilion.camera import Camera
 from vermilion.capture.adjust_poses import adjust, lay_onto, midpoints, residuals_px
+from vermilion.capture.patches import Greys, align_patches
 from vermilion.capture.tracks import (
     Features,
     MatchSettings,
@@ -35,6 +37,8 @@ class RefineSettings:
         fine_gate_deg: as `MatchSettings.gate_deg`, once the poses are better.
         max_residual_px: observations that lie farther from their point at the end are outliers.
         loss_px: residual at which the robust loss turns from squared to linear.
+        patch_radius_px: half the width of the patches that are matched last; 0 for none.
+        patch_residual_px, patch_loss_px: as the two above, over patches.
         min_tracks: tracks without which nothing is refined.
         min_camera_tracks: a camera with fewer keeps its given pose.
         held_out: part of the tracks that the adjustment never sees, in (0, 1).
@@ -48,6 +52,9 @@ class RefineSettings:
     fine_gate_deg: float = 0.1
     max_residual_px: float = 1.0
     loss_px: float = 0.3
+    patch_radius_px: int = 8
+    patch_residual_px: float = 0.3
+    patch_loss_px: float = 0.1
     min_tracks: int = 100
     min_camera_tracks: int = 30
     held_out: float = 0.2
@@ -68,7 +75,8 @@ class Refinement:
         reason: why, or why not.
         tracks: number of tracks adjusted and held out.
         before_px, after_px: {median, rms} over the held-out tracks, each triangulated with those
-            cameras; the rms is of observations within 20 px, as no match is sure.
+            cameras; the rms is of observations within 20 px, as no match is sure. Where the rig
+            was refined over patches, both are over the held-out tracks' patches.
         moved: camera -> {turned_deg, moved_mm, observations}.
         shown: camera -> (seen (n, 2), given (n, 2), refined (n, 2)) pixels of the held-out tracks
             of the first frame, for overlays.
@@ -132,6 +140,9 @@ def refine_cameras(
     near = replace(matching, gate_deg=settings.fine_gate_deg)
     again = _match(rough, _without(pictures, held), near)
     cameras, used = _solve(rough, again, given, settings) if again.count else (rough, fitted)
+    greys = _greys(pictures) if settings.patch_radius_px else None
+    if greys is not None:
+        cameras, used = _solve_patches(cameras, used, given, greys, settings)
     enough = sorted(_linked(used, settings.min_camera_tracks))
     tracks["adjusted"] = used.count
     if used.count < settings.min_tracks or len(enough) < 2:
@@ -144,6 +155,10 @@ def refine_cameras(
         settings.shift_mm,
     )
     cameras = given | laid
+    if greys is not None:
+        # laid on by the refined poses, as patches start within pixels; then held against both rigs
+        held = _aligned(cameras, _consistent(cameras, held, settings), greys, settings)
+        expected, before = _measured(given, held, settings)
     refined, after = _measured(cameras, held, settings)
     shown = _shown(held, expected, refined)
     seen = dict(zip(used.cameras, used.per_camera(), strict=True))
@@ -180,7 +195,8 @@ def _without(pictures: Pictures, tracks: Tracks) -> Pictures:
             mine = (tracks.frame == frame) & (tracks.camera == i)
             taken = {tuple(xy) for xy in tracks.pixels[mine]}
             free = np.array([tuple(xy) not in taken for xy in views[name].points_px], bool)
-            rest[frame][name] = Features(views[name].points_px[free], views[name].descriptors[free])
+            old = views[name]
+            rest[frame][name] = Features(old.points_px[free], old.descriptors[free], old.grey)
     return rest
 
 
@@ -211,6 +227,44 @@ def _solve(
             shift_mm=settings.shift_mm,
         )
     return cameras, tracks
+
+
+def _greys(pictures: Pictures) -> Greys | None:
+    """The pictures of all features; None where one is not known."""
+    greys = {
+        frame: {name: features.grey for name, features in views.items()}
+        for frame, views in pictures.items()
+    }
+    known = all(grey is not None for views in greys.values() for grey in views.values())
+    return greys if known else None
+
+
+def _solve_patches(
+    cameras: dict[str, Camera],
+    tracks: Tracks,
+    given: dict[str, Camera],
+    greys: Greys,
+    settings: RefineSettings,
+) -> tuple[dict[str, Camera], Tracks]:
+    """Poses over the patches of tracks; the poses and tracks as they were where few agree."""
+    aligned = _aligned(cameras, tracks, greys, settings)
+    if aligned.count < settings.min_tracks:
+        return cameras, tracks
+    fine = replace(
+        settings, max_residual_px=settings.patch_residual_px, loss_px=settings.patch_loss_px
+    )
+    return _solve(cameras, aligned, given, fine)
+
+
+def _aligned(cameras, tracks: Tracks, greys: Greys, settings: RefineSettings) -> Tracks:
+    points = midpoints(cameras, tracks)
+    return align_patches(cameras, tracks, points, greys, radius_px=settings.patch_radius_px)
+
+
+def _consistent(cameras, tracks: Tracks, settings: RefineSettings) -> Tracks:
+    """Tracks without the observations that are no match by any measure."""
+    distance = residuals_px(cameras, tracks, midpoints(cameras, tracks))
+    return tracks.kept(distance < 3 * settings.max_residual_px)
 
 
 def _linked(tracks: Tracks, least: int) -> set[str]:

@@ -22,10 +22,12 @@ class Features:
     Attributes:
         points_px: (N, 2).
         descriptors: (N, 128) float32 of unit length.
+        grey: (h, w) uint8, the picture itself; None where it is not known.
     """
 
     points_px: np.ndarray
     descriptors: np.ndarray
+    grey: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def find_features(linear_rgb: np.ndarray, contrast: float, max_features: int) ->
     points, found = extractor.extract(pycolmap.Bitmap.from_array(np.ascontiguousarray(grey)))
     descriptors = np.asarray(found.data, np.float32).reshape(len(points), -1)
     descriptors /= np.maximum(np.linalg.norm(descriptors, axis=1, keepdims=True), 1e-9)
-    return Features(np.array([(p.x, p.y) for p in points]).reshape(-1, 2), descriptors)
+    return Features(np.array([(p.x, p.y) for p in points]).reshape(-1, 2), descriptors, grey)
 
 
 def match_frame(

@@ -144,6 +144,25 @@ class RefinementConfig(StageConfig):
     loss_px: float = Field(
         0.3, gt=0, le=20, description="Residual at which the robust loss becomes linear (pixels)."
     )
+    patch_radius_px: int = Field(
+        8,
+        ge=0,
+        le=30,
+        description="Half the width of the surface patches that are matched by least squares at the "
+        "end (px); 0: none, features are as exact as their detector.",
+    )
+    patch_residual_px: float = Field(
+        0.3,
+        gt=0.01,
+        le=10,
+        description="Patches farther from their point are outliers (px).",
+    )
+    patch_loss_px: float = Field(
+        0.1,
+        gt=0.001,
+        le=10,
+        description="Residual of patches at which the robust loss turns linear (px).",
+    )
     min_tracks: int = Field(
         100, ge=20, description="Nothing is refined over fewer points seen by two cameras (count)."
     )

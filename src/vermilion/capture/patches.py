@@ -1,0 +1,148 @@
+"""Observations of a track to a small part of a pixel: least-squares matching of surface patches.
+
+A feature detector places a point in each picture by itself, a quarter of a pixel off. Here the patch
+round a point in one picture is laid on the tangent plane of the surface, projected into each other
+picture of the track, and shifted there until the pictures agree (Gruen 1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vermilion.camera import Camera
+from vermilion.capture.tracks import Tracks
+
+Greys = Mapping[int, Mapping[str, np.ndarray]]  # frame -> camera -> (h, w) float32
+
+
+def align_patches(
+    cameras: Mapping[str, Camera],
+    tracks: Tracks,
+    points_mm: np.ndarray,
+    greys: Greys,
+    *,
+    radius_px: int = 8,
+    neighbours: int = 12,
+    rounds: int = 10,
+    max_shift_px: float = 2.0,
+    min_correlation: float = 0.8,
+) -> Tracks:
+    """The tracks with every observation aligned to that of the camera that looks most frontally.
+
+    Args:
+        cameras: good to some pixels.
+        points_mm: (P, 3) of the tracks.
+        greys: the pictures.
+        radius_px: half the width of a patch.
+        neighbours: points that settle a tangent plane.
+        max_shift_px: observations whose patch lies farther from its point are dropped;
+            so are those whose patches correlate less than `min_correlation`.
+    """
+    normals = _normals(tracks, points_mm, neighbours)
+    towards = np.stack([cameras[n].centre_mm for n in tracks.cameras])[tracks.camera]
+    towards = towards - points_mm[tracks.track]
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    frontal = np.abs((towards * normals[tracks.track]).sum(axis=1))
+    order = np.lexsort((-frontal, tracks.track))
+    first = np.unique(tracks.track[order], return_index=True)[1]
+    base = order[first]  # observation that each track is aligned to
+    pixels, good = tracks.pixels.copy(), np.zeros(len(tracks.pixels), dtype=bool)
+    good[base] = True
+    others = np.setdiff1d(np.arange(len(pixels)), base)
+    cells = np.stack(
+        [tracks.frame[others], tracks.camera[base[tracks.track[others]]], tracks.camera[others]]
+    )
+    for frame, source, target in np.unique(cells, axis=1).T:
+        rows = others[(cells == np.array([[frame], [source], [target]])).all(axis=0)]
+        a, b = (tracks.cameras[k] for k in (source, target))
+        at = base[tracks.track[rows]]
+        where, patch = _laid_over(
+            cameras[a], cameras[b], greys[frame][a], tracks.pixels[at],
+            points_mm[tracks.track[rows]], normals[tracks.track[rows]], radius_px,
+        )  # fmt: skip
+        shift, correlation = _shifts(greys[frame][b], where, patch, rounds, max_shift_px)
+        middle = where.shape[1] // 2
+        pixels[rows] = where[:, middle] + shift
+        good[rows] = (correlation >= min_correlation) & (
+            np.linalg.norm(shift, axis=1) < max_shift_px
+        )
+    return replace(tracks, pixels=pixels).kept(good)
+
+
+def _normals(tracks: Tracks, points_mm: np.ndarray, neighbours: int) -> np.ndarray:
+    """Unit normal (P, 3), up to its sign, of the plane through the nearest points of the frame."""
+    frames = np.zeros(len(points_mm), dtype=int)
+    frames[tracks.track] = tracks.frame
+    normals = np.zeros_like(points_mm)
+    for frame in np.unique(frames):
+        rows = np.flatnonzero(frames == frame)
+        near = cKDTree(points_mm[rows]).query(points_mm[rows], k=min(neighbours, len(rows)))[1]
+        around = points_mm[rows][near.reshape(len(rows), -1)]
+        around = around - np.median(around, axis=1, keepdims=True)
+        # a wrong point is far away: weights fall with the distance, so that it turns no plane
+        distance = np.linalg.norm(around, axis=2, keepdims=True)
+        around = around / np.maximum(distance, np.median(distance, axis=1, keepdims=True)) ** 2
+        normals[rows] = np.linalg.svd(around, full_matrices=False)[2][:, -1]
+    return normals
+
+
+def _laid_over(source, target, grey, pixels, points_mm, normals, radius_px):
+    """Patches of a picture over tangent planes: ((N, S, 2) target pixels, (N, S) values)."""
+    step = np.arange(-radius_px, radius_px + 1)
+    grid = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
+    at = pixels[:, None] + grid
+    origins, directions = source.rays(at.reshape(-1, 2))
+    origins = np.broadcast_to(origins, directions.shape).reshape(*at.shape[:2], 3)
+    directions = directions.reshape(*at.shape[:2], 3)
+    height = ((points_mm[:, None] - origins) * normals[:, None]).sum(axis=2)
+    along = height / np.where(
+        np.abs(slope := (directions * normals[:, None]).sum(axis=2)) > 0.1, slope, np.nan
+    )
+    there = target.project((origins + along[..., None] * directions).reshape(-1, 3))
+    return there.reshape(at.shape), _sampled(grey, at)
+
+
+def _shifts(grey, where, patch, rounds, max_shift_px):
+    """Shift (N, 2) px that makes a picture agree with patches up to gain and offset; agreement."""
+    y_slope, x_slope = np.gradient(grey.astype(np.float32))
+    wanted = _standardised(patch)[0]
+    shift = np.zeros((len(where), 2))
+    for _ in range(rounds):
+        at = where + shift[:, None]
+        values, scale = _standardised(_sampled(grey, at))
+        slopes = np.stack([_sampled(s, at) for s in (x_slope, y_slope)], axis=2)
+        slopes = (slopes - slopes.mean(axis=1, keepdims=True)) / scale[..., None]
+        # the part of a slope along the patch itself is gain
+        slopes = (
+            slopes - (slopes * values[..., None]).sum(axis=1, keepdims=True) * values[..., None]
+        )
+        left = slopes.transpose(0, 2, 1) @ slopes + 1e-9 * np.eye(2)
+        right = (slopes * (wanted - values)[..., None]).sum(axis=1)
+        step = np.linalg.solve(
+            np.nan_to_num(left) + 1e-9 * np.eye(2), np.nan_to_num(right)[..., None]
+        )
+        shift = np.clip(shift + step[..., 0], -max_shift_px, max_shift_px)
+    values, _ = _standardised(_sampled(grey, where + shift[:, None]))
+    return shift, np.nan_to_num((values * wanted).sum(axis=1))
+
+
+def _standardised(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N, S) with mean zero and unit norm, and the norms (N, 1)."""
+    values = values - values.mean(axis=1, keepdims=True)
+    scale = np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1e-6)
+    return values / scale, scale
+
+
+def _sampled(grey: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Cubic values (N, S) at pixels (N, S, 2); NaN pixels give NaN."""
+    where = (pixels - 0.5).astype(np.float32)
+    values = cv2.remap(
+        grey.astype(np.float32), where[..., 0], where[..., 1], cv2.INTER_CUBIC,
+        borderMode=cv2.BORDER_REPLICATE,
+    )  # fmt: skip
+    return np.where(np.isfinite(where).all(axis=2), values, np.nan)
