@@ -25,7 +25,8 @@ def bind_vertices(
     The closest points of neighbours can lie in another order than the neighbours themselves, above
     all where a lip turns inwards. The corners of such triangles, and by less the vertices about them,
     slide towards the middle of their neighbours' points, on the surface, until none faces the wrong
-    way.
+    way. Folds that do not open even when more and more of their surroundings move stay, and only what
+    lies next to them has moved.
 
     Args:
         registered: near the accurate mesh.
@@ -49,10 +50,16 @@ def bind_vertices(
     triangle = np.where(distance <= max_distance_mm, found.triangle, -1)
     found = SurfaceMap(triangle, found.barycentric.copy())
     normals_there = vertex_normals(accurate.vertices_mm, accurate.triangles)
-    for index in range(rounds):
+    local = found
+    for index in range(rounds + 1):
         points = found.sample(accurate.vertices_mm, accurate.triangles)
         folded = flipped_triangles(found, registered.triangles, accurate)
         if not folded.any():
+            break
+        if index == ROUNDS_A_RING:
+            local = SurfaceMap(found.triangle.copy(), found.barycentric.copy())
+        if index == rounds:  # no room helps: what little was moved at first is kept
+            found = local
             break
         pull = np.zeros(len(normals))
         pull[registered.triangles[folded]] = 0.5
