@@ -6,13 +6,15 @@ The only rules that read truth.
 
 def truth_files(subject, take):
     """Vertices and triangles of a take's known truth; none where there is none."""
-    if CONFIG.evaluation.truth:
-        folder = Path(CONFIG.evaluation.truth) / subject / take
-        files = [folder / "vertices_mm.npy", folder / "triangles.npy"]
-        return [str(path) for path in files] if all(path.is_file() for path in files) else []
     if _TAKES[f"{subject}/{take}"].source == STUDIO:
-        return [f"{R}/truth/{subject}/{take}/{name}.npy" for name in ("vertices_mm", "triangles")]
-    return []
+        folder = Path(R) / "truth" / subject / take
+    elif CONFIG.evaluation.truth:
+        folder = Path(CONFIG.evaluation.truth) / subject / take
+    else:
+        return []
+    files = [folder / "vertices_mm.npy", folder / "triangles.npy"]
+    known = _TAKES[f"{subject}/{take}"].source == STUDIO or all(path.is_file() for path in files)
+    return [str(path) for path in files] if known else []
 
 
 def neutral_truth_files(subject):
