@@ -10,11 +10,15 @@ import cv2
 import numpy as np
 
 from vermilion.camera import Camera, look_at, pinhole
+from vermilion.draw import to_display
 from vermilion.faces.model import REGIONS, FaceModel
 from vermilion.images import srgb_to_linear
 from vermilion.inpaint.fields import sample
 from vermilion.mesh import normalised, vertex_normals
 from vermilion.raycast import RayCaster, interpolate
+
+#: Opening (mm) and pucker of a few mouths.
+POSES = {"rest": (0.0, 0.0), "open": (7.0, 0.1), "pucker": (1.0, 1.0)}
 
 ROWS, COLUMNS = 28, 96
 INNER_ROWS, LIP_ROWS = 3, 11  # rows before the lips, rows before the skin
@@ -118,3 +122,9 @@ def render(
     colour = sample(albedo(tattoo), texel) * (shade * light)[..., None]
     colour = np.where(hits.hit[..., None], colour, 0.004)
     return cv2.resize(colour.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+
+
+def psnr_db(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> float:
+    """Signal to noise of display colours of two linear pictures (dB)."""
+    error = (to_display(a)[where].astype(float) - to_display(b)[where].astype(float)) / 255
+    return float(-10 * np.log10((error**2).mean()))

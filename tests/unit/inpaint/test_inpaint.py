@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -17,42 +15,9 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.fields import fill_holes, sample, weighted_blur
 from vermilion.inpaint.files import read_texture, write_texture
 from vermilion.inpaint.grain import add_grain, fine_deviation, seed_of
-from vermilion.inpaint.opening import Evidence, find_opening
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading, bare_skin, change_ratio
 from vermilion.inpaint.tattoo import feathered, tattoo_mask
-from vermilion.raycast import RayCaster
-
-POSES = {"rest": (0.0, 0.0), "open": (7.0, 0.1), "pucker": (1.0, 1.0)}
-
-
-@pytest.fixture(scope="module")
-def model():
-    return lip_patch.face_model()
-
-
-@pytest.fixture(scope="module")
-def domain(model):
-    return lip_domain(model, skin_mm=9.0, inner_mm=4.0, texel_mm=0.3)
-
-
-@pytest.fixture(scope="module")
-def textures(model, domain):
-    """Plain and tattooed neutral from all cameras, tattooed neutral from the front."""
-    rest, rig = model.neutral_mm, lip_patch.cameras()
-
-    def baked(tattoo, names):
-        views = [(rig[n], lip_patch.render(model, rest, rig[n], tattoo)) for n in names]
-        return bake(domain, rest, model.triangles, views)
-
-    return baked(False, rig), baked(True, rig), baked(True, ["front"])
-
-
-@pytest.fixture(scope="module")
-def opacity(domain, textures):
-    mask = tattoo_mask(domain, textures[1], textures[0], reach_mm=4.0, sensitivity=6.0)
-    return feathered(domain, mask, border_mm=0.6, feather_mm=1.0)
-
 
 # Fields
 
@@ -228,14 +193,9 @@ def test_noise_has_the_deviation_asked_for_and_its_seed():
 # The whole
 
 
-def psnr_db(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> float:
-    error = (to_display(a)[where].astype(float) - to_display(b)[where].astype(float)) / 255
-    return float(-10 * np.log10((error**2).mean()))
-
-
-@pytest.mark.parametrize("pose", POSES)
+@pytest.mark.parametrize("pose", lip_patch.POSES)
 def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opacity, pose):
-    vertices = lip_patch.vertices_at(*POSES[pose])
+    vertices = lip_patch.vertices_at(*lip_patch.POSES[pose])
     camera = lip_patch.cameras()["front"]
     tattooed = lip_patch.render(model, vertices, camera, tattoo=True)
     truth = lip_patch.render(model, vertices, camera, tattoo=False)
@@ -247,7 +207,7 @@ def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opa
     telea_db = -10 * np.log10(
         (((telea[where].astype(float) - to_display(truth)[where]) / 255) ** 2).mean()
     )
-    ours_db = psnr_db(painted.linear, truth, where)
+    ours_db = lip_patch.psnr_db(painted.linear, truth, where)
     assert ours_db >= 30.0
     assert ours_db > telea_db + 5.0
     assert painted.border_levels < 2.0
@@ -262,90 +222,3 @@ def test_lips_outside_the_picture_are_left_alone(model, domain, textures, opacit
     away = model.neutral_mm + np.array([500.0, 0.0, 0.0])
     blank = np.zeros((180, 240, 3), np.float32)
     assert paint_frame(paint, blank, camera, away, model.triangles, (0,)) is None
-
-
-# The mouth opening
-
-
-@pytest.fixture(scope="module")
-def open_mouth(model):
-    """The tattooed mouth, open, seen from the front."""
-    camera = lip_patch.cameras()["front"]
-    vertices = lip_patch.vertices_at(*POSES["open"])
-    return camera, vertices, lip_patch.render(model, vertices, camera, tattoo=True)
-
-
-def opening_of(model, domain, camera, picture, vertices, **evidence):
-    ends = camera.project(vertices[domain.corners])
-    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    box = (np.zeros(2), np.array([camera.width_px, camera.height_px]))
-    caster = RayCaster(vertices, model.triangles)
-    return find_opening(domain, caster, camera, picture, axis, box, 1 / 3, Evidence(**evidence))
-
-
-def wrong_pixels(opening, open_mouth, model) -> int:
-    """Pixels whose middle is inked but counted open, or the other way."""
-    camera, vertices, _ = open_mouth
-    hit = RayCaster(vertices, model.triangles).see(camera).hit
-    found = opening.inside(camera.pixel_grid())
-    middle = np.abs(camera.pixel_grid() - [120, 90]) < [30, 60]  # away from the corners
-    return int((found == hit)[middle.all(axis=-1) & (found | ~hit)].sum())
-
-
-def lower_lip_raised(vertices: np.ndarray, up_mm: float) -> np.ndarray:
-    return vertices + np.where(vertices[:, 1:2] < -1.0, [0.0, up_mm, 0.0], 0.0)
-
-
-def test_the_opening_is_found_where_the_mesh_has_it_wrong(model, domain, open_mouth):
-    camera, vertices, picture = open_mouth
-    wrong = lower_lip_raised(vertices, 1.5)
-    believed = opening_of(model, domain, camera, picture, wrong, reach_mm=0.0)
-    found = opening_of(model, domain, camera, picture, wrong)
-    assert wrong_pixels(believed, open_mouth, model) > 150
-    assert wrong_pixels(found, open_mouth, model) < 0.35 * wrong_pixels(believed, open_mouth, model)
-
-
-def test_an_opening_that_the_mesh_has_right_stays(model, domain, open_mouth):
-    camera, vertices, picture = open_mouth
-    mesh = opening_of(model, domain, camera, picture, vertices, reach_mm=0.0)
-    found = opening_of(model, domain, camera, picture, vertices)
-    step_mm = np.linalg.norm(found.across_px) / 3
-    middle = slice(len(found.columns) // 4, -len(found.columns) // 4)
-    assert np.abs(found.upper - mesh.upper)[middle].max() * step_mm < 0.5
-    assert np.abs(found.lower - mesh.lower)[middle].max() * step_mm < 0.5
-
-
-def test_what_lies_behind_the_lips_is_not_painted(model, domain, textures, opacity, open_mouth):
-    camera, vertices, picture = open_mouth
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, 0.0, grain=False)
-    wrong = lower_lip_raised(vertices, 1.5)
-    painted = paint_frame(paint, picture, camera, wrong, model.triangles, (0,))
-    behind = ~RayCaster(vertices, model.triangles).see(camera).hit
-    behind = cv2.erode(behind.astype(np.uint8), np.ones((5, 5))) > 0
-    changed = np.abs(painted.linear - picture).max(axis=2) > 0.02
-    assert changed[behind].mean() < 0.01
-
-
-def test_a_shadow_between_the_lips_is_kept(model, domain, textures, opacity):
-    camera, vertices = lip_patch.cameras()["front"], model.neutral_mm
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, 0.0, grain=False)
-    flat = replace(paint, shading=Shading(seam_mm=0.0))
-    middle = camera.project(np.zeros((1, 3)))[0, 1]
-    away = np.abs(camera.pixel_grid()[..., 1] - middle)
-    shadow = np.clip(away / 6.0, 0.3, 1.0).astype(np.float32)[..., None]
-    inked, truth = (
-        lip_patch.render(model, vertices, camera, tattoo) * shadow for tattoo in (True, False)
-    )
-    lips = (opening_rim(model, camera, vertices)) & (away < 7.0)
-    with_seam, without = (
-        psnr_db(paint_frame(p, inked, camera, vertices, model.triangles, (0,)).linear, truth, lips)
-        for p in (paint, flat)
-    )
-    assert with_seam > without + 2.0
-
-
-def opening_rim(model, camera, vertices) -> np.ndarray:
-    """Pixels of the vermilion."""
-    hits = RayCaster(vertices, model.triangles).see(camera)
-    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
-    return hits.hit & lips[model.triangles].all(axis=1)[hits.triangle]
