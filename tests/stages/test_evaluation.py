@@ -198,9 +198,10 @@ def test_tables_figures_and_page(scene):
     ev = root / "evaluation"
     run_script(
         "measures",
-        params={"cfg": CFG},
+        params={"cfg": CFG, "takes": [{"take": "ana/rom", "role": "tattoo"}]},
         input={
             "takes": [ev / "truth/sums.npz"],
+            "seconds": [ev / "truth/seconds.tsv"],
             "reconstructions": [out / "sums.npz"],
             "tables": [ev / "truth/measures.tsv", out / "measures.tsv"],
         },

@@ -11,9 +11,12 @@ from vermilion.evaluation.corrected import measure_name
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.figures import map_frames
 from vermilion.evaluation.files import load_sums, save_sums
-from vermilion.evaluation.pooled import pooled_rows
+from vermilion.evaluation.measures import seconds_rows
+from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.evaluation.table1 import in_order, kind_of, table1
 from vermilion.page import number, page, spans, table
+
+SECONDS = ["subject", "take", "regressor", "seconds_per_frame"]
 
 
 def take(base, regressor, name):
@@ -37,6 +40,20 @@ def test_every_person_has_their_own_ps_in_the_pool():
     assert rows.loc[("vertex_error_mean_mm", "PS"), "frames"] == 30
     # The oracle is held against the base of its own take alone.
     assert rows.loc[("ratio_to_base", "oracle"), "value"] == 0.25
+
+
+def test_takes_of_several_roles_are_also_joined_by_role():
+    assert groups_of(["video", "video"]) == {"all": [0, 1]}
+    assert groups_of(["tattoo", "video"]) == {"all": [0, 1], "tattoo": [0], "video": [1]}
+
+
+def test_seconds_of_all_takes_are_the_mean_over_frames():
+    one = pd.DataFrame([("s1", "rom", "PS-s1", 0.001)], columns=SECONDS)
+    two = pd.DataFrame([("s2", "rom", "PS-s2", 0.003)], columns=SECONDS)
+    rows = seconds_rows([one, two], {"s1/rom": 30, "s2/rom": 10})
+    assert rows["regressor"].tolist() == ["PS", "PS-s1", "PS-s2"]
+    assert rows["value"].tolist() == [0.0015, 0.001, 0.003]
+    assert rows["frames"].tolist() == [40, 30, 10]
 
 
 def test_table1_has_the_papers_order_and_the_pool_first():

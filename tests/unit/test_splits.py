@@ -10,6 +10,7 @@ from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
+from vermilion.evaluation.regressors import regressors_of, regressors_of_study, with_variants
 from vermilion.regression.training import Selection, train, training_subjects
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])
@@ -51,11 +52,6 @@ def write(path, takes):
     write_database(path, TRIANGLES, NAMES, people, entries)
 
 
-def regressors_of(subjects):
-    names = ["MS", *(f"PS-{s}" for s in subjects)]
-    return names + [f"GR-{s}" for s in subjects if len(subjects) > 1]
-
-
 @settings(max_examples=25, deadline=None)
 @given(sheet=sheets)
 def test_no_regressor_trains_on_what_it_is_judged_by(sheet, tmp_path_factory):
@@ -63,8 +59,10 @@ def test_no_regressor_trains_on_what_it_is_judged_by(sheet, tmp_path_factory):
     path = tmp_path_factory.mktemp("split") / "lips.h5"
     write(path, takes)
     with LipDatabase(path) as database:
-        for name in regressors_of(database.subjects):
+        trained = {take.subject for take in takes if take.train_frames()}
+        for name in regressors_of_study(database.subjects, trained):
             people = training_subjects(name, database.subjects)
+            assert not trained or set(people) & trained
             wanted = {(t.name, f) for t in takes if t.subject in people for f in t.train_frames()}
             if len(wanted) < 5:
                 continue
@@ -104,3 +102,22 @@ def test_a_frame_trains_or_is_held_out_but_never_both(split):
     assert not set(take.train_frames()) & set(take.test_frames())
     both = set(take.train_frames()) | set(take.test_frames())
     assert both == (set() if split == "none" else set(range(12)))
+
+
+@given(people=st.lists(st.sampled_from("abcde"), min_size=1, unique=True), data=st.data())
+def test_a_person_is_judged_by_what_was_trained_and_by_nothing_twice(people, data):
+    trained = data.draw(st.sets(st.sampled_from(people), min_size=1))
+    study = regressors_of_study(people, trained)
+    for subject in people:
+        names = regressors_of(subject, trained)
+        assert set(names) <= set(study)
+        rows = [frozenset(set(training_subjects(name, people)) & trained) for name in names]
+        if len(trained) > 1:  # with one person who trains, PS and MS are the same
+            assert len(set(rows)) == len(rows)
+        if subject not in trained:
+            assert names == [f"GR-{subject}"]
+
+
+def test_variants_are_made_of_the_kinds_asked_for():
+    names = with_variants(["PS-an-na", "MS", "GR-an-na"], ["rbf"], ["MS", "GR"])
+    assert names == ["PS-an-na", "MS", "GR-an-na", "MS-rbf", "GR-an-na-rbf"]

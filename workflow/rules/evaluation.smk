@@ -46,9 +46,12 @@ def reconstructed_takes():
 
 def evaluated_models(subject):
     """Model files to measure on a person's takes: their PS, MS, the GR without them, variants."""
-    names = [name for name in (f"PS-{subject}", "MS", f"GR-{subject}") if name in regressor_names()]
-    names += [f"{name}-{variant}" for variant in CONFIG.evaluation.variants for name in names]
-    return [f"{R}/models/{name}.h5" for name in names]
+    options = CONFIG.evaluation
+    names = regressors_of(subject, trained_subjects())
+    return [
+        f"{R}/models/{name}.h5"
+        for name in with_variants(names, options.variants, options.variants_of)
+    ]
 
 
 def evaluate_inputs(wildcards):
@@ -183,6 +186,7 @@ rule measures:
     """Joins the measures of all takes, and the takes together: measures.tsv, table1.tsv."""
     input:
         takes=of_takes(EVALUATED + "/sums.npz", evaluated_takes()),
+        seconds=of_takes(EVALUATED + "/seconds.tsv", evaluated_takes()),
         reconstructions=of_takes(RECONSTRUCTED + "/sums.npz", reconstructed_takes()),
         tables=of_takes(EVALUATED + "/measures.tsv", evaluated_takes())
         + of_takes(RECONSTRUCTED + "/measures.tsv", reconstructed_takes()),
@@ -215,5 +219,6 @@ rule measures:
     params:
         cfg=cfg_of("evaluation.measures"),
         code=code_of("measures"),
+        takes=[{"take": take.name, "role": take.role} for take in evaluated_takes()],
     script:
         "../scripts/measures.py"

@@ -1,11 +1,14 @@
 """Regressors from features to correction layers: models/{regressor}.h5 (Lips16 5.2, 6)."""
 
 
+def trained_subjects():
+    """Subjects who have training frames."""
+    return list(dict.fromkeys(take.subject for take in takes("tattoo") if take.train_frames()))
+
+
 def regressor_names():
-    """PS of every subject, MS, and GR of every subject where there are two or more."""
-    people = subjects("tattoo")
-    names = [f"PS-{subject}" for subject in people] + ["MS"]
-    return names + [f"GR-{subject}" for subject in people if len(people) > 1]
+    """PS of every subject who trains, MS, and GR of every subject where others train."""
+    return regressors_of_study(subjects("tattoo"), trained_subjects())
 
 
 def regressor_outputs():

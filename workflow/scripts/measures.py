@@ -5,8 +5,8 @@ import pandas as pd
 from vermilion.config.evaluation import MeasuresConfig
 from vermilion.evaluation.figures import bars
 from vermilion.evaluation.files import load_sums
-from vermilion.evaluation.measures import COLUMNS
-from vermilion.evaluation.pooled import pooled_rows
+from vermilion.evaluation.measures import COLUMNS, seconds_rows
+from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.evaluation.table1 import table1
 from vermilion.logfile import log_to
 from vermilion.tables import read_table, write_table
@@ -15,10 +15,17 @@ from vermilion.tables import read_table, write_table
 def main(snakemake):
     options = MeasuresConfig(**snakemake.params.cfg["evaluation.measures"])
     pooled = (options.bootstrap_samples, options.confidence, options.seed)
+    takes = [load_sums(path) for path in snakemake.input.takes]
+    reconstructions = [load_sums(path) for path in snakemake.input.reconstructions]
     tables = [pd.DataFrame(columns=list(COLUMNS))]
-    for sums in (snakemake.input.takes, snakemake.input.reconstructions):
-        tables.append(pooled_rows([load_sums(path) for path in sums], *pooled))
+    for group, members in groups_of([take["role"] for take in snakemake.params.takes]).items():
+        tables.append(pooled_rows([takes[index] for index in members], *pooled, group))
+    tables.append(pooled_rows(reconstructions, *pooled))
     tables += [read_table(path, COLUMNS) for path in snakemake.input.tables]
+    if takes:
+        names = [take["take"] for take in snakemake.params.takes]
+        frames = dict(zip(names, (count for _, count in takes), strict=True))
+        tables.append(seconds_rows([read_table(path) for path in snakemake.input.seconds], frames))
     measures = pd.concat([table for table in tables if len(table)] or tables[:1], ignore_index=True)
     write_table(snakemake.output.measures, measures)
     summary = table1(measures)

@@ -107,6 +107,9 @@ class EvaluationConfig(StageConfig):
             "the configured one on some of the features, or the paper's network with layers alone.",
         )
     )
+    variants_of: list[Literal["PS", "MS", "GR"]] = Field(
+        ["PS", "MS", "GR"], description="Regressors that the variants are made of."
+    )
     measures: MeasuresConfig = Field(
         default_factory=MeasuresConfig, description="Figures and their intervals."
     )

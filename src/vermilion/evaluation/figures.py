@@ -11,7 +11,7 @@ import pandas as pd
 
 from vermilion.camera import Camera, look_at, pinhole
 from vermilion.draw import colour_map
-from vermilion.evaluation.table1 import in_order, kind_of
+from vermilion.evaluation.table1 import in_order, kind_of, place_of
 from vermilion.export.shading import shade
 from vermilion.plot import new_figure, plain, save, with_gaps
 
@@ -156,8 +156,9 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
     axis = figure.subplots()
     places, names, y = [], [], 0.0
     for (subject, take), rows in groups:
-        title = "all takes" if subject == "all" else f"{subject}/{take}"
-        axis.text(0, y, title, fontsize=8.5, fontweight="bold", va="center", color=_INK)
+        axis.text(
+            0, y, place_of(subject, take), fontsize=8.5, fontweight="bold", va="center", color=_INK
+        )
         y += 1
         for row in rows.itertuples():
             axis.barh(y, row.mean_mm, 0.72, color=colour_of(row.regressor))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import pandas as pd
 
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.masks import REGION_NAMES
 from vermilion.evaluation.statistics import Resampling, histogram_quantile
+from vermilion.evaluation.table1 import kind_of
 
 COLUMNS = (
     "measure", "region", "subject", "take", "regressor", "value", "unit", "low", "high", "frames",
@@ -56,6 +59,38 @@ def measure_rows(
                     (measure, region, subject, take, regressor, value, unit, low, high, n_frames)
                 )
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def seconds_rows(tables: Sequence[pd.DataFrame], frames: Mapping[str, int]) -> pd.DataFrame:
+    """`seconds_per_frame` of every take, and the mean over frames of all takes, without intervals.
+
+    Args:
+        tables: columns subject, take, regressor, seconds_per_frame, a table a take.
+        frames: `subject/take` -> frames measured.
+    """
+    rows = pd.concat(tables, ignore_index=True)
+    rows["frames"] = [
+        frames[f"{s}/{t}"] for s, t in zip(rows["subject"], rows["take"], strict=True)
+    ]
+    rows = rows.dropna(subset="seconds_per_frame")
+    together = (
+        rows.assign(
+            regressor=rows["regressor"].map(kind_of),
+            total=rows["seconds_per_frame"] * rows["frames"],
+        )
+        .groupby("regressor", sort=False)[["total", "frames"]]
+        .sum()
+    )
+    together = together.reset_index().assign(
+        subject="all",
+        take="all",
+        seconds_per_frame=together["total"].values / together["frames"].values,
+    )
+    joined = pd.concat([together, rows], ignore_index=True)
+    values = joined["seconds_per_frame"].map(lambda seconds: float(f"{seconds:.3g}"))
+    return joined.assign(
+        measure="seconds_per_frame", region="mouth", value=values, unit="s", low=np.nan, high=np.nan
+    )[list(COLUMNS)]
 
 
 def _figures(of_regressor: ClipSums, base: ClipSums | None, draws: np.ndarray):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from vermilion import page
-from vermilion.evaluation.table1 import in_order
+from vermilion.evaluation.table1 import in_order, place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "held_out", "against")
 _STAGES = (
@@ -90,7 +90,7 @@ _MAP_CAPTION = (
 
 def _key_figures(found: Findings) -> str:
     items = []
-    rows = found.table1[found.table1["subject"] == "all"].set_index("regressor")
+    rows = _together(found.table1).set_index("regressor")
     for name in in_order(rows.index):
         row = rows.loc[name]
         if name == "base":
@@ -109,13 +109,11 @@ def _table1(found: Findings) -> str:
     if found.table1.empty:
         return '<p class="none">No take has held-out frames.</p>'
     rows = found.table1.copy()
-    rows["where"] = [
-        "all takes" if s == "all" else f"{s}/{t}"
-        for s, t in zip(rows["subject"], rows["take"], strict=True)
-    ]
+    rows["where"] = [place_of(s, t) for s, t in zip(rows["subject"], rows["take"], strict=True)]
     headings = {
         "where": "take", "regressor": "regressor", "mean_mm": "mean, mm", "low_mm": "low",
         "high_mm": "high", "std_mm": "deviation, mm", "ratio_to_base": "of base",
+        "ratio_low": "low", "ratio_high": "high", "base_mm": "base on the same frames, mm",
         "frames": "frames",
     }  # fmt: skip
     caption = (
@@ -127,7 +125,8 @@ def _table1(found: Findings) -> str:
 
 
 def _further(measures: pd.DataFrame) -> str:
-    rows = measures[(measures["subject"] == "all") & (measures["regressor"] != "H")]
+    rows = _together(measures)
+    rows = rows[rows["regressor"] != "H"]
     if rows.empty:
         return ""
     wide = rows.pivot_table(
@@ -228,11 +227,14 @@ the same draws, so that ratios compare like with like. With one clip there is no
 """
 
 
+def _together(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows of all takes together."""
+    return rows[(rows["subject"] == "all") & (rows["take"] == "all")]
+
+
 def _value(measures: pd.DataFrame, measure: str, region: str, regressor: str) -> float | None:
-    rows = measures[
-        (measures["measure"] == measure)
-        & (measures["region"] == region)
-        & (measures["regressor"] == regressor)
-        & (measures["subject"] == "all")
+    rows = _together(measures)
+    rows = rows[
+        (rows["measure"] == measure) & (rows["region"] == region) & (rows["regressor"] == regressor)
     ]
     return None if rows.empty else float(rows["value"].iloc[0])

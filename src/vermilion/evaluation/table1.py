@@ -15,6 +15,13 @@ def kind_of(regressor: str) -> str:
     return f"{kind}/{variant}" if variant else kind
 
 
+def place_of(subject: str, take: str) -> str:
+    """Which frames a row is about, as a reader says it."""
+    if subject != "all":
+        return f"{subject}/{take}"
+    return "all takes" if take == "all" else f"all {take} takes"
+
+
 def in_order(regressors) -> list[str]:
     """Regressors in the order of the paper's table, variants after them."""
 
@@ -33,7 +40,8 @@ def table1(measures: pd.DataFrame, region: str = "mouth") -> pd.DataFrame:
         measures: rows of `measures.tsv`.
 
     Returns:
-        columns subject, take, regressor, mean_mm, low_mm, high_mm, std_mm, ratio_to_base, frames.
+        columns subject, take, regressor, mean_mm, low_mm, high_mm, std_mm, ratio_to_base, ratio_low,
+        ratio_high, base_mm, frames. `base_mm` is the base track on the regressor's own frames.
     """
     rows = measures[(measures["region"] == region) & (measures["regressor"] != "H")]
     records = []
@@ -44,6 +52,8 @@ def table1(measures: pd.DataFrame, region: str = "mouth") -> pd.DataFrame:
                 continue
             mean = figures.loc["vertex_error_mean_mm"]
             value = figures["value"]
+            ratio = figures.loc["ratio_to_base"] if "ratio_to_base" in figures.index else {}
+            share = 1.0 if regressor == "base" else ratio.get("value")
             records.append(
                 {
                     "subject": subject,
@@ -53,13 +63,16 @@ def table1(measures: pd.DataFrame, region: str = "mouth") -> pd.DataFrame:
                     "low_mm": mean["low"],
                     "high_mm": mean["high"],
                     "std_mm": value.get("vertex_error_std_mm"),
-                    "ratio_to_base": 1.0 if regressor == "base" else value.get("ratio_to_base"),
+                    "ratio_to_base": share,
+                    "ratio_low": ratio.get("low"),
+                    "ratio_high": ratio.get("high"),
+                    "base_mm": mean["value"] / share if share else None,
                     "frames": int(mean["frames"]),
                 }
             )
     columns = [
         "subject", "take", "regressor", "mean_mm", "low_mm", "high_mm", "std_mm",
-        "ratio_to_base", "frames",
+        "ratio_to_base", "ratio_low", "ratio_high", "base_mm", "frames",
     ]  # fmt: skip
     table = pd.DataFrame(records, columns=columns)
     # The takes together come first.

@@ -1,0 +1,33 @@
+"""Which regressors a study trains, and by which of them a person is judged (Lips16 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+
+def regressors_of_study(people: Sequence[str], trained: Collection[str]) -> list[str]:
+    """Names of all regressors: PS of everyone who trains, MS, and GR of everyone.
+
+    Args:
+        people: subjects with an accurate mesh.
+        trained: those of them who have training frames.
+    """
+    names = [f"PS-{subject}" for subject in people if subject in trained] + ["MS"]
+    return names + [f"GR-{subject}" for subject in people if set(trained) - {subject}]
+
+
+def regressors_of(subject: str, trained: Collection[str]) -> list[str]:
+    """Names of the regressors that a person is judged by.
+
+    A person who trains nothing has no PS, and to them MS would be GR under another name: GR alone.
+    """
+    own = [f"PS-{subject}", "MS"] if subject in trained else []
+    return [*own, f"GR-{subject}"] if set(trained) - {subject} else own
+
+
+def with_variants(
+    names: Sequence[str], variants: Sequence[str], kinds: Collection[str]
+) -> list[str]:
+    """The names, then every variant of those of them whose kind (PS, MS, GR) is asked for."""
+    of_kind = [name for name in names if name.split("-", 1)[0] in kinds]
+    return [*names, *(f"{name}-{variant}" for variant in variants for name in of_kind)]
