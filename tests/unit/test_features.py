@@ -199,6 +199,8 @@ def test_feature_table_comes_back_as_written_and_joins_chunks(tmp_path):
     assert joined.features.shape == (4, 23)
     assert joined.names.tolist() == feature_names(3).tolist()
     assert joined.valid.tolist() == [True, False, True, False]
+    assert joined.outer_found.shape == joined.outer_px.shape[:2]
+    assert not joined.outer_found.any() and not joined.inner_found.any()  # no maps were given
     (tmp_path / "0.npz").write_bytes(b"PK damaged")
     with pytest.raises(InputError, match="unreadable feature file"):
         FeatureTable.load(tmp_path / "0.npz")

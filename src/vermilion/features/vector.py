@@ -13,7 +13,10 @@ from vermilion.features.contour_features import FrameContours
 from vermilion.features.distances import NAMES
 from vermilion.quality import QualityRow
 
-ARRAYS = ("frames", "features", "names", "outer_px", "inner_px", "valid", "found")
+ARRAYS = (
+    "frames", "features", "names", "outer_px", "inner_px", "outer_found", "inner_found", "valid",
+    "found",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class FeatureTable:
             distance.
         names: (M,) str.
         outer_px, inner_px: (F, n, 2) contours in the image.
+        outer_found, inner_found: (F, n) bool; elsewhere the model's contour stands in.
         valid: (F,) bool.
         found: (F, 2) share of the outer and of the inner samples that met a maximum.
     """
@@ -35,6 +39,8 @@ class FeatureTable:
     names: np.ndarray
     outer_px: np.ndarray
     inner_px: np.ndarray
+    outer_found: np.ndarray
+    inner_found: np.ndarray
     valid: np.ndarray
     found: np.ndarray
 
@@ -55,6 +61,8 @@ class FeatureTable:
             feature_names(shape.shape[1]),
             np.stack([entry.outer_px for entry in contours]),
             np.stack([entry.inner_px for entry in contours]),
+            np.stack([entry.outer_found for entry in contours]),
+            np.stack([entry.inner_found for entry in contours]),
             np.asarray(valid, dtype=bool),
             np.asarray(found),
         )
