@@ -97,7 +97,7 @@ def contour_error_px(detector, frame: LabelledFrame) -> tuple[dict[str, float], 
     ring = loop_spline(frame.landmarks_px[LIP_OUTER], 80)
     outer = find_outer(outer_map, ring, unit, settings)
     model_inner = loop_spline(frame.landmarks_px[LIP_INNER], 80)
-    inner = find_inner(inner_map, outer.points_px, model_inner, unit, settings)
+    inner = find_inner(inner_map, outer.points, model_inner, unit, settings)
     scale = 120.0 / np.ptp(frame.label.outer.points_px[:, 0])
     ends = frame.label.inner.points_px[:, 0]
     between = (inner.points_px[:, 0] > ends.min()) & (inner.points_px[:, 0] < ends.max())

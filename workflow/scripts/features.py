@@ -42,9 +42,12 @@ def main(snakemake) -> None:
     contours, quality, pictures = [], [], []
     for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):
         path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
+        row = rows[index]
         maps = read_maps(path, frame=frame) if path.exists() else None
-        found = sampler.find(coarse[index], fit.camera, maps)
-        tracked = bool(fit.valid[rows[index]])
+        pose = (fit.world_from_head_rotation[row], fit.world_from_head_translation_mm[row])
+        pose = pose if cfg.space == "head" else None
+        found = sampler.find(coarse[index], fit.camera, maps, pose)
+        tracked = bool(fit.valid[row])
         contours.append(found)
         quality.append(judge(frame, found, tracked, maps is not None, cfg.least_found))
         if frame in shown:
@@ -57,7 +60,8 @@ def main(snakemake) -> None:
         snakemake.params.frames,
         space.coefficients(displacement),
         contours,
-        [row.valid for row in quality],
+        [entry.valid for entry in quality],
+        cfg.space,
     )
     table.save(snakemake.output.features)
     write_quality(snakemake.output.quality, subject, take, "features", quality)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field, field_validator
 
 from vermilion.config.base import StageConfig
@@ -24,6 +26,11 @@ class ContourFeaturesConfig(StageConfig):
     Lengths are per inter-ocular distance.
     """
 
+    space: Literal["head", "image"] = Field(
+        "head",
+        description="`head`: contours are put back on the tracked lips and measured in 3D, so that a "
+        "turn of the head is undone (Lips16 7). `image`: measured in the picture (Lips16 5.1).",
+    )
     samples: int = Field(
         80, ge=20, le=400, description="Samples on each contour (a multiple of 20)."
     )

@@ -23,7 +23,7 @@ class FrameContours:
         outer_px, inner_px: (n, 2).
         model_outer_px, model_inner_px: (n, 2) the coarse mesh's own.
         outer_found, inner_found: (n,) bool; elsewhere the model's contour stands in.
-        interocular_px: the unit of the distances.
+        interocular_px: inter-ocular distance in the picture.
     """
 
     distances: np.ndarray
@@ -61,31 +61,47 @@ class ContourSampler:
         vertices_mm: np.ndarray,
         camera: Camera,
         maps: tuple[np.ndarray, np.ndarray] | None,
+        pose: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> FrameContours:
-        """Contours of a coarse mesh (V, 3) in the world; `maps` (inner, outer), or None.
+        """Contours and distances of a coarse mesh.
 
-        Without maps the model's own contours are given, none of them found.
+        Args:
+            vertices_mm: (V, 3) in the world.
+            camera: of the pictures.
+            maps: likelihood maps (inner, outer), (h, w) each; None: the model's own contours are
+                given, none of them found.
+            pose: rotation (3, 3) and translation (3,) mm of `world_from_head`: the search and the
+                distances are in the head frame, where a turn of the head is undone (Lips16 7).
+                None: they are in the picture (Lips16 5.1).
         """
-        unit = interocular_px(vertices_mm[self.eye_corners], camera)
-        model_outer = camera.project(self.outer.points(vertices_mm))
-        model_inner = camera.project(self.inner.points(vertices_mm))
-        if maps is None:
-            outer, inner = model_outer, model_inner
-            outer_found = inner_found = np.zeros(len(outer), dtype=bool)
+        unit_px = interocular_px(vertices_mm[self.eye_corners], camera)
+        model_outer, model_inner = (r.points(vertices_mm) for r in (self.outer, self.inner))
+        if pose is None:
+            unit, to_pixels = unit_px, np.asarray
+            model_outer, model_inner = camera.project(model_outer), camera.project(model_inner)
         else:
-            found = find_outer(maps[1], model_outer, unit, self.settings)
-            outer, outer_found = found.points_px, found.found
-            found = find_inner(maps[0], outer, model_inner, unit, self.settings)
-            inner, inner_found = found.points_px, found.found
+            rotation, translation = pose
+            unit = float(np.linalg.norm(np.diff(vertices_mm[self.eye_corners], axis=0)))
+            model_outer, model_inner = (
+                (points - translation) @ rotation for points in (model_outer, model_inner)
+            )
+
+            def to_pixels(points):
+                return camera.project(points @ rotation.T + translation)
+
+        outer, inner = model_outer, model_inner
+        outer_found = inner_found = np.zeros(len(outer), dtype=bool)
+        if maps is not None:
+            found = find_outer(maps[1], outer, unit, self.settings, to_pixels)
+            outer, outer_found = found.points, found.found
+            found = find_inner(maps[0], outer, inner, unit, self.settings, to_pixels)
+            inner, inner_found = found.points, found.found
         return FrameContours(
             contour_distances(outer, inner, unit),
-            outer,
-            inner,
-            model_outer,
-            model_inner,
+            *(to_pixels(points) for points in (outer, inner, model_outer, model_inner)),
             outer_found,
             inner_found,
-            unit,
+            unit_px,
         )
 
 

@@ -8,8 +8,9 @@ of the upper and of the lower half of the outer contour, from the subject's righ
 - `upper_lip_j`, j = 1, 3, 5, 7, 9: from outer(j) to the inner contour found from it;
 - `lower_lip_j`, j = 1, 3, 5, 7, 9: from lower(j) to the inner contour found from it.
 
-Height less the lips' widths is the mouth's opening there. All are Euclidean, in the image, per
-inter-ocular distance: they do not change when the picture is moved, scaled or turned.
+Height less the lips' widths is the mouth's opening there. All are Euclidean, per inter-ocular
+distance. In the picture they do not change when it is moved, scaled or turned; in the head frame they
+do not change when the head turns out of the picture's plane either (Lips16 7).
 """
 
 from __future__ import annotations
@@ -26,28 +27,26 @@ NAMES = (
 )
 
 
-def contour_distances(outer_px: np.ndarray, inner_px: np.ndarray, unit_px: float) -> np.ndarray:
+def contour_distances(outer: np.ndarray, inner: np.ndarray, unit: float) -> np.ndarray:
     """The distances of `NAMES`, (20,), per inter-ocular distance.
 
     Args:
-        outer_px: (n, 2) ring, n a multiple of 20.
-        inner_px: (n, 2); sample k was found from sample k of the outer ring.
-        unit_px: inter-ocular distance in pixels.
+        outer: ring, (n, 2) px or (n, 3) mm, n a multiple of 20.
+        inner: as `outer`; sample k was found from sample k of the outer ring.
+        unit: inter-ocular distance, as the rings.
 
     Each but the width is the mean over the samples within a twentieth of a half, which halves the
     noise of single samples.
     """
-    n = len(outer_px)
-    if n % 20 or n != len(inner_px):
-        raise ValueError(
-            f"rings must have the same multiple of 20 samples, got {n}, {len(inner_px)}"
-        )
+    n = len(outer)
+    if n % 20 or n != len(inner):
+        raise ValueError(f"rings must have the same multiple of 20 samples, got {n}, {len(inner)}")
     tenth = n // 20
-    width = np.linalg.norm(outer_px[0] - outer_px[n // 2])
-    height = np.linalg.norm(outer_px - outer_px[-np.arange(n)], axis=1)
-    lip = np.linalg.norm(outer_px - inner_px, axis=1)
+    width = np.linalg.norm(outer[0] - outer[n // 2])
+    height = np.linalg.norm(outer - outer[-np.arange(n)], axis=1)
+    lip = np.linalg.norm(outer - inner, axis=1)
     around = np.arange(-(tenth // 2), tenth // 2 + 1)
     heights = [height[j * tenth + around].mean() for j in HEIGHTS]
     upper = [lip[j * tenth + around].mean() for j in LIPS]
     lower = [lip[n - j * tenth + around].mean() for j in LIPS]
-    return np.array([width, *heights, *upper, *lower]) / unit_px
+    return np.array([width, *heights, *upper, *lower]) / unit

@@ -1,19 +1,25 @@
 """Search for contours in likelihood maps along lines from the coarse model (Lips16 5.1).
 
-Each sample of the projected outer contour looks along the gradient of the iso-lines, that is along
-the normal of the contour. The offsets of all samples of a frame are chosen together, as the
-smoothest ring through likely places near the model's (dynamic programming round the ring), then
-moved to the crest of their ridge. Nothing is carried from frame to frame.
+Each sample of the outer contour looks along the gradient of the iso-lines, that is along the normal
+of the contour. The offsets of all samples of a frame are chosen together, as the smoothest ring
+through likely places near the model's (dynamic programming round the ring), then moved to the crest
+of their ridge. Nothing is carried from frame to frame.
+
+Rings are (n, 2) pixels, or (n, 3) mm in the head frame. There, normals lie in the head's frontal
+plane and lines follow the depth of the coarse lips, so that every place on a line is a pixel of the
+map put back on the template (Lips16 7), and a turned head is searched as a facing one is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from vermilion.contours.paths import cheapest_ring
+from vermilion.features.arch import arch_depth
 
 
 @dataclass(frozen=True)
@@ -58,23 +64,24 @@ class FoundRing:
     """A detected contour.
 
     Attributes:
-        points_px: (n, 2).
+        points: (n, 2) px or (n, 3) mm, as the ring that the search started from.
         offset: (n,) along the search lines, per inter-ocular distance.
         found: (n,) bool; where False no maximum was there and the model's contour stands in.
     """
 
-    points_px: np.ndarray
+    points: np.ndarray
     offset: np.ndarray
     found: np.ndarray
 
 
-def inward_normals(ring_px: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 2) of a closed ring (n, 2), towards its inside."""
-    tangent = np.roll(ring_px, -1, axis=0) - np.roll(ring_px, 1, axis=0)
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+def inward_normals(ring: np.ndarray) -> np.ndarray:
+    """Unit normals, as the closed ring (n, 2 or 3), towards its inside in the plane of x and y."""
+    tangent = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+    normal = np.zeros_like(ring, dtype=np.float64)
+    normal[:, 0], normal[:, 1] = -tangent[:, 1], tangent[:, 0]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    following = np.roll(ring_px, -1, axis=0)
-    area = np.sum(ring_px[:, 0] * following[:, 1] - ring_px[:, 1] * following[:, 0])
+    following = np.roll(ring, -1, axis=0)
+    area = np.sum(ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0])
     return normal if area > 0 else -normal
 
 
@@ -86,57 +93,73 @@ def smoothed_ring(values: np.ndarray, passes: int) -> np.ndarray:
 
 
 def find_outer(
-    likelihood: np.ndarray, ring_px: np.ndarray, unit_px: float, settings: SearchSettings
+    likelihood: np.ndarray,
+    ring: np.ndarray,
+    unit: float,
+    settings: SearchSettings,
+    to_pixels: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> FoundRing:
     """The outer contour near the model's ring.
 
     Args:
         likelihood: (h, w) in [0, 1].
-        ring_px: (n, 2) samples of the model's outer contour in the image.
-        unit_px: inter-ocular distance in pixels.
+        ring: (n, 2) px or (n, 3) mm, samples of the model's outer contour.
+        unit: inter-ocular distance, as the ring.
         settings: of the search.
+        to_pixels: points (..., 3) of a ring in the head frame to pixels (..., 2).
     """
-    normals = inward_normals(smoothed_ring(ring_px, 2))
+    normals = inward_normals(smoothed_ring(ring, 2))
     places = np.arange(-settings.outward, settings.inward + 1e-9, settings.step)
-    profile = sample(likelihood, ring_px[:, None] + places[:, None] * unit_px * normals[:, None])
+    lines, depth = ring[:, None] + places[:, None] * unit * normals[:, None], arch_depth(ring)
+    lines[..., 2:] += depth(lines) - depth(ring)[:, None]
+    profile = sample(likelihood, to_pixels(lines))
     cost = -np.log(profile + settings.floor)
     cost += settings.model_weight * (places / settings.inward) ** 2
-    chosen = cheapest_ring(cost, _smoothness(ring_px, unit_px, settings))
-    return _refined(profile, places, chosen, ring_px, normals, unit_px, settings)
+    chosen = cheapest_ring(cost, _smoothness(ring, unit, settings))
+    return _refined(profile, places, chosen, lines, settings)
 
 
 def find_inner(
     likelihood: np.ndarray,
-    outer_px: np.ndarray,
-    model_inner_px: np.ndarray,
-    unit_px: float,
+    outer: np.ndarray,
+    model_inner: np.ndarray,
+    unit: float,
     settings: SearchSettings,
+    to_pixels: Callable[[np.ndarray], np.ndarray] = np.asarray,
 ) -> FoundRing:
     """The inner contour, looked for from the found outer contour inwards.
 
     The inner contour is the first that a line meets: a place is less likely by the chance that
     the line met the contour before. A closed mouth needs no care: the upper and the lower half
-    meet the same line.
+    meet the same line. In the head frame a line starts at the depth of the outer contour and has that
+    of the model's inner one from there on.
 
     Args:
         likelihood: (h, w) in [0, 1].
-        outer_px: (n, 2) found outer contour.
-        model_inner_px: (n, 2) samples of the model's inner contour in the image.
-        unit_px: inter-ocular distance in pixels.
+        outer: (n, 2) px or (n, 3) mm, found outer contour.
+        model_inner: as `outer`, samples of the model's inner contour.
+        unit: inter-ocular distance, as the rings.
         settings: of the search.
+        to_pixels: points (..., 3) of a ring in the head frame to pixels (..., 2).
     """
-    normals = inward_normals(smoothed_ring(outer_px, 4))
+    normals = inward_normals(smoothed_ring(outer, 4))
     places = np.arange(0.0, settings.depth + 1e-9, settings.step)
-    profile = sample(likelihood, outer_px[:, None] + places[:, None] * unit_px * normals[:, None])
-    expected = np.einsum("nk,nk->n", model_inner_px - outer_px, normals) / unit_px
+    expected = np.einsum("nk,nk->n", model_inner - outer, normals) / unit
     expected = np.clip(smoothed_ring(expected, 2), 0.0, settings.depth)
+    lines, depth = outer[:, None] + places[:, None] * unit * normals[:, None], arch_depth(outer)
+    from_outer, from_inner = outer[:, 2:] - depth(outer), model_inner[:, 2:] - depth(model_inner)
+    passed = np.minimum(places / np.maximum(expected, settings.step)[:, None], 1.0)[..., None]
+    lines[..., 2:] = (
+        depth(lines) + from_outer[:, None] * (1 - passed) + from_inner[:, None] * passed
+    )
+    profile = sample(likelihood, to_pixels(lines))
     ridge = round(0.012 / settings.step)  # half the width of a ridge does not count as before
     before = np.cumsum(-np.log1p(-np.minimum(profile, 0.98)), axis=1) * (settings.step / 0.02)
     before = np.pad(before, ((0, 0), (ridge, 0)))[:, : len(places)]
     cost = -np.log(profile + settings.floor) + before
     cost += settings.model_weight * ((places - expected[:, None]) / settings.inward) ** 2
-    chosen = cheapest_ring(cost, _smoothness(outer_px, unit_px, settings))
-    return _refined(profile, places, chosen, outer_px, normals, unit_px, settings)
+    chosen = cheapest_ring(cost, _smoothness(outer, unit, settings))
+    return _refined(profile, places, chosen, lines, settings)
 
 
 def sample(values: np.ndarray, points_px: np.ndarray) -> np.ndarray:
@@ -154,9 +177,9 @@ def sample(values: np.ndarray, points_px: np.ndarray) -> np.ndarray:
     return found.astype(np.float64)
 
 
-def _smoothness(ring_px: np.ndarray, unit_px: float, settings: SearchSettings) -> np.ndarray:
+def _smoothness(ring: np.ndarray, unit: float, settings: SearchSettings) -> np.ndarray:
     """(n,) cost of one squared step between sample k and the next."""
-    apart = np.linalg.norm(np.roll(ring_px, -1, axis=0) - ring_px, axis=1) / unit_px
+    apart = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) / unit
     return settings.smooth_weight * (settings.step / np.maximum(apart, settings.step)) ** 2
 
 
@@ -164,9 +187,7 @@ def _refined(
     profile: np.ndarray,
     places: np.ndarray,
     chosen: np.ndarray,
-    ring_px: np.ndarray,
-    normals: np.ndarray,
-    unit_px: float,
+    lines: np.ndarray,
     settings: SearchSettings,
 ) -> FoundRing:
     """Move each choice to the nearest maximum within the ridge, to a fraction of a step."""
@@ -179,6 +200,8 @@ def _refined(
     maximum = (top >= left) & (top >= right) & (top >= settings.least_likelihood)
     bend = left - 2 * top + right
     shift = np.where(bend < -1e-12, 0.5 * (left - right) / np.where(bend < -1e-12, bend, 1.0), 0.0)
-    crest = places[best] + np.clip(shift, -0.5, 0.5) * settings.step
-    offset = np.where(maximum, crest, places[chosen])
-    return FoundRing(ring_px + offset[:, None] * unit_px * normals, offset, maximum)
+    place = np.where(maximum, best + np.clip(shift, -0.5, 0.5), chosen)
+    below = np.clip(np.floor(place).astype(int), 0, m - 2)
+    part = (place - below)[:, None]
+    points = lines[rows, below] * (1 - part) + lines[rows, below + 1] * part
+    return FoundRing(points, places[0] + place * settings.step, maximum)

@@ -26,7 +26,7 @@ class FeatureTable:
     Attributes:
         frames: (F,) int.
         features: (F, M) float64: |psi| shape coefficients in mm, 20 distances per inter-ocular
-            distance.
+            distance, in the head frame where `names` say `head_`, else in the picture.
         names: (M,) str.
         outer_px, inner_px: (F, n, 2) contours in the image.
         outer_found, inner_found: (F, n) bool; elsewhere the model's contour stands in.
@@ -51,14 +51,18 @@ class FeatureTable:
         shape: np.ndarray,
         contours: Sequence[FrameContours],
         valid: Sequence[bool],
+        space: str = "image",
     ) -> FeatureTable:
-        """Join shape coefficients (F, P) and the contours of the same frames."""
+        """Join shape coefficients (F, P) and the contours of the same frames.
+
+        `space`: `head` or `image`, where the contours' distances were measured.
+        """
         distances = np.stack([entry.distances for entry in contours])
         found = [[entry.outer_found.mean(), entry.inner_found.mean()] for entry in contours]
         return cls(
             np.asarray(frames, dtype=np.int64),
             np.concatenate([shape, distances], axis=1),
-            feature_names(shape.shape[1]),
+            feature_names(shape.shape[1], space),
             np.stack([entry.outer_px for entry in contours]),
             np.stack([entry.inner_px for entry in contours]),
             np.stack([entry.outer_found for entry in contours]),
@@ -84,9 +88,11 @@ class FeatureTable:
         return cls(names=parts[0]["names"], **joined)
 
 
-def feature_names(n_shape: int) -> np.ndarray:
-    """Names of the features, (M,) str."""
-    return np.array([*(f"shape_{k + 1:02d}" for k in range(n_shape)), *NAMES])
+def feature_names(n_shape: int, space: str = "image") -> np.ndarray:
+    """Names of the features, (M,) str; distances in the head frame begin with `head_`."""
+    prefix = "head_" if space == "head" else ""
+    shape = (f"shape_{k + 1:02d}" for k in range(n_shape))
+    return np.array([*shape, *(prefix + name for name in NAMES)])
 
 
 def judge(
