@@ -18,7 +18,7 @@ AFTER_TRAINING = {
 AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
 AFTER_CONTOURS = AFTER_FEATURES | {"features"}
 AFTER_TRACKING = AFTER_CONTOURS | {
-    "tracking_meshes", "correspondence", "layers", "evaluate_reconstruction",
+    "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
     "landmarks", "identity", "tracking", "tracking_topology", "contour_detector", "contours",

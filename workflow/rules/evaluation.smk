@@ -83,6 +83,53 @@ EVALUATED = R + "/evaluation/takes/{subject}/{take}"
 RECONSTRUCTED = R + "/evaluation/reconstruction/{subject}/{take}"
 
 
+def training_takes():
+    """Tattoo takes with training frames."""
+    return [take for take in takes("tattoo") if take.train_frames()]
+
+
+def of_training_chunks(pattern):
+    """`pattern` for every chunk of every training take."""
+    return [
+        path
+        for take in training_takes()
+        for path in expand_chunks(R + "/takes/{subject}/{take}/" + pattern, take.subject, take.take)
+    ]
+
+
+rule lip_shapes:
+    """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        correspondence=[f"{R}/subjects/{name}/correspondence.npz" for name in trained_subjects()],
+        accurate=of_training_chunks("multiview/H/{chunk}.npy"),
+        accurate_quality=of_training_chunks("multiview/quality/{chunk}.tsv"),
+        neutrals=of_takes(R + "/takes/{subject}/{take}/multiview/neutral.npz", training_takes()),
+    output:
+        shapes=R + "/evaluation/lip_shapes.npz",
+    log:
+        R + "/logs/lip_shapes.log",
+    benchmark:
+        R + "/benchmarks/lip_shapes.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        cfg=cfg_of("evaluation.contour"),
+        code=code_of("evaluation_lip_shapes"),
+        subjects=trained_subjects(),
+        takes=[
+            {
+                "take": take.name,
+                "train": take.train_frames(),
+                "chunks": len(chunks(take.subject, take.take)),
+            }
+            for take in training_takes()
+        ],
+    script:
+        "../scripts/evaluation_lip_shapes.py"
+
+
 rule evaluate:
     """Applies every regressor to the held-out frames of a take and measures: measures.tsv."""
     input:
@@ -91,6 +138,7 @@ rule evaluate:
         template=R + "/face/template.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         identity=R + "/subjects/{subject}/identity.npz",
+        shapes=R + "/evaluation/lip_shapes.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
         features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
@@ -112,6 +160,7 @@ rule evaluate:
         cfg=cfg_of(
             "evaluation.reference",
             "evaluation.measures",
+            "evaluation.contour",
             "evaluation.figures.map_frames",
             "correction.integration",
         ),

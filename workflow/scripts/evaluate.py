@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.config.correction import IntegrationConfig
-from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
+from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.errors import InputError
 from vermilion.evaluation import held_out
+from vermilion.evaluation.contour_tracker import ContourTracker, FoundContours
 from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
 from vermilion.evaluation.files import read_chunks, read_frames, save_arrays, save_sums
+from vermilion.evaluation.lip_shapes import LipShapes
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import reference_of
@@ -22,6 +24,8 @@ from vermilion.regression.model import load_model
 from vermilion.sequences import read_sequence
 from vermilion.tables import write_table
 from vermilion.tracking.result import Identity, TrackedTake
+
+CONTOURS = ("outer_px", "inner_px", "outer_found", "inner_found")
 
 
 def tracked_frames(fit, asked, place):
@@ -73,6 +77,17 @@ def coarse_take(inputs, tracker, fit, frames, integration):
     )
 
 
+def contour_track(inputs, tracker, fit, take, correspondence, found, weights, options):
+    """The baseline of Lips16 section 6: lip shapes of the training, fitted to the contours."""
+    shapes = LipShapes.load(inputs.shapes).on(
+        correspondence.coarse_neutral_mm, tracker.triangles, take.seam_mm
+    )
+    fitted = ContourTracker(tracker, shapes, found.outer_px.shape[1], options.ridge)
+    return fitted.track(
+        take.coarse_mm, take.rotation, take.translation_mm, weights, fit.camera, found
+    )
+
+
 def main(snakemake):
     inputs, out, cfg = snakemake.input, snakemake.output, snakemake.params.cfg
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
@@ -97,6 +112,11 @@ def main(snakemake):
         measure_name(Path(path).stem): held_out.Regressed.of(load_model(path), take)
         for path in inputs.models
     }
+    contours = read_chunks(inputs.features, frames, CONTOURS)
+    sequences["contour"] = contour_track(
+        inputs, tracker, fit, take, correspondence, FoundContours(**contours),
+        fit.weights[fit.index_of(frames)], ContourConfig(**cfg["evaluation.contour"]),
+    )  # fmt: skip
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
     result = evaluate_take(
@@ -105,10 +125,15 @@ def main(snakemake):
     )  # fmt: skip
 
     sums = dict(result.sums)
-    contours = read_chunks(inputs.features, frames, ["outer_px", "inner_px"])
     for name, sequence in sequences.items():
         sums[name] += held_out.sums_of_contours(
-            sequence, take.coarse_mm, tracker, fit.camera, **contours, clips=result.clips
+            sequence,
+            take.coarse_mm,
+            tracker,
+            fit.camera,
+            contours["outer_px"],
+            contours["inner_px"],
+            result.clips,
         )
     for name, of_model in regressed.items():
         sums[name] += held_out.sums_of_regressor(of_model, take, true, result.clips)

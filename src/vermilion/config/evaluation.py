@@ -65,6 +65,24 @@ class MeasuresConfig(StageConfig):
     seed: int = Field(0, ge=0, description="Seed of the bootstrap.")
 
 
+class ContourConfig(StageConfig):
+    """The baseline of Lips16 section 6: the tracker with lip shapes, aligned to the contours."""
+
+    shapes: int = Field(
+        30,
+        ge=1,
+        le=200,
+        description="Lip shapes, chosen from the training takes and transferred to each person "
+        "(Lips16: 30).",
+    )
+    ridge: float = Field(
+        0.02,
+        gt=0.0,
+        description="Cost of a weight that moves the lips by 1 mm, beside a mean square distance of "
+        "1 mm2 to the contours.",
+    )
+
+
 class FiguresConfig(StageConfig):
     """Pictures of the report."""
 
@@ -109,6 +127,9 @@ class EvaluationConfig(StageConfig):
     )
     variants_of: list[Literal["PS", "MS", "GR"]] = Field(
         ["PS", "MS", "GR"], description="Regressors that the variants are made of."
+    )
+    contour: ContourConfig = Field(
+        default_factory=ContourConfig, description="The contour baseline (Lips16 section 6)."
     )
     measures: MeasuresConfig = Field(
         default_factory=MeasuresConfig, description="Figures and their intervals."

@@ -1,0 +1,150 @@
+"""Two people up to trained regressors, and the measures of one of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.stages.lip_scene import BAD_FRAME, CHUNKS, TEST, TRAIN, models, write_subject
+from tests.stages.run_script import run_script
+from tests.stages.test_correction import (
+    SUBJECTS,
+    run_correspondence,
+    run_database,
+    run_layers,
+    run_train,
+)
+from vermilion.config.apply import OverlayConfig
+from vermilion.config.evaluation import (
+    ContourConfig,
+    EvaluationConfig,
+    MeasuresConfig,
+    ReferenceConfig,
+)
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation.files import load_arrays, save_arrays
+from vermilion.sequences import write_sequence
+from vermilion.tracking.result import Identity
+
+SUBJECT = "ana"
+MODELS = ("PS-ana", "MS", "GR-ana", "MS-rbf", "MS-affine", "MS-shape-only", "MS-distances-only")
+CFG = {
+    "evaluation.reference": ReferenceConfig().model_dump(),
+    "evaluation.measures": MeasuresConfig(bootstrap_samples=200).model_dump(),
+    "evaluation.contour": ContourConfig(shapes=8).model_dump(),
+    "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
+    "evaluation.figures.map_frames": 2,
+    "correction.integration": {"seam_mm": 8.0, "detail_mm": 15.0},
+    "apply.overlay": OverlayConfig(panel_height_px=160).model_dump(),
+    "apply.export": {"obj": True, "usd": True},
+}
+
+
+@pytest.fixture(scope="package")
+def scene(tmp_path_factory):
+    """Two people up to trained regressors, the identity and the truth of each."""
+    root = tmp_path_factory.mktemp("results")
+    accurate, tracker = models()
+    accurate.save(root / "face/template.npz")
+    tracker.save(root / "face/tracker.npz")
+    for seed, subject in enumerate(SUBJECTS, start=1):
+        _, truth = write_subject(root, subject, accurate, tracker, seed)
+        write_truth(root / f"truth/{subject}/rom", truth, accurate.triangles)
+        run_correspondence(root, subject)
+        for chunk in CHUNKS:
+            run_layers(root, subject, chunk)
+            add_contours(root / f"takes/{subject}/rom/correction/features/{chunk}.npz")
+        write_identity(root, subject)
+    run_database(root)
+    for regressor in MODELS:
+        run_train(root, regressor)
+    run_lip_shapes(root)
+    evaluate(root, "truth", truth=True)
+    evaluate(root, "held_out", truth=False)
+    return SimpleNamespace(root=root, tracker=tracker)
+
+
+def write_truth(folder, truth, triangles):
+    write_sequence(folder / "vertices_mm.npy", truth)
+    np.save(folder / "triangles.npy", triangles)
+
+
+def add_contours(path):
+    """Contours that were not found: the scene has no pictures."""
+    arrays = load_arrays(path)
+    nothing = np.full((len(arrays["frames"]), 8, 2), np.nan)
+    found = np.zeros(nothing.shape[:2], dtype=bool)
+    none = {"outer_px": nothing, "inner_px": nothing, "outer_found": found, "inner_found": found}
+    save_arrays(path, arrays | none)
+
+
+def write_identity(root, subject):
+    neutral = Correspondence.load(root / f"subjects/{subject}/correspondence.npz").coarse_neutral_mm
+    Identity(
+        np.zeros(4), neutral, np.zeros((66, 3)), np.array(["rom"]), np.array([900.0]),
+        np.array([True]),
+    ).save(root / f"subjects/{subject}/identity.npz")  # fmt: skip
+
+
+def run_lip_shapes(root):
+    takes = [root / f"takes/{subject}/rom" for subject in SUBJECTS]
+    run_script(
+        "evaluation_lip_shapes",
+        params={
+            "cfg": CFG,
+            "subjects": list(SUBJECTS),
+            "takes": [
+                {"take": f"{s}/rom", "train": list(TRAIN), "chunks": len(CHUNKS)} for s in SUBJECTS
+            ],
+        },
+        input={
+            "tracker": root / "face/tracker.npz",
+            "correspondence": [root / f"subjects/{s}/correspondence.npz" for s in SUBJECTS],
+            "accurate": [take / f"multiview/H/{c}.npy" for take in takes for c in CHUNKS],
+            "accurate_quality": [
+                take / f"multiview/quality/{c}.tsv" for take in takes for c in CHUNKS
+            ],
+            "neutrals": [take / "multiview/neutral.npz" for take in takes],
+        },
+        output={"shapes": root / "evaluation/lip_shapes.npz"},
+    )
+
+
+def evaluate(root, name, truth):
+    take, out = root / f"takes/{SUBJECT}/rom", root / f"evaluation/{name}"
+    known = [root / f"truth/{SUBJECT}/rom/{part}.npy" for part in ("vertices_mm", "triangles")]
+    inputs = {
+        "tracker": root / "face/tracker.npz",
+        "template": root / "face/template.npz",
+        "correspondence": root / f"subjects/{SUBJECT}/correspondence.npz",
+        "identity": root / f"subjects/{SUBJECT}/identity.npz",
+        "shapes": root / "evaluation/lip_shapes.npz",
+        "fit": take / "tracking/fit.npz",
+        "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
+        "features": [take / f"correction/features/{c}.npz" for c in CHUNKS],
+        "layers": [take / f"correction/layers/{c}.npz" for c in CHUNKS],
+        "models": [root / f"models/{m}.h5" for m in MODELS],
+        "accurate": [take / f"multiview/H/{c}.npy" for c in CHUNKS],
+    }
+    if truth:
+        inputs |= {
+            "truth": known,
+            "neutral_truth": known,
+            "neutral_accurate": take / f"multiview/H/{CHUNKS[0]}.npy",
+        }
+    run_script(
+        "evaluate",
+        wildcards={"subject": SUBJECT, "take": "rom"},
+        params={"cfg": CFG, "frames": [BAD_FRAME, *TEST], "first": 0},
+        input=inputs,
+        output={
+            "sums": out / "sums.npz",
+            "seconds": out / "seconds.tsv",
+            "measures": out / "measures.tsv",
+            "frames": out / "frames.tsv",
+            "maps": out / "maps.npz",
+            "quality": out / "quality.tsv",
+        },
+    )

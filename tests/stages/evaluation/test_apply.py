@@ -1,0 +1,108 @@
+"""Corrected takes: chunks, overlay, and the formats that other programs open."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.stages.evaluation.conftest import CFG, SUBJECT
+from tests.stages.lip_scene import BAD_FRAME, CHUNKS
+from tests.stages.run_script import run_script
+from vermilion.evaluation.files import load_arrays, save_arrays
+from vermilion.images import write_srgb8
+from vermilion.sequences import read_mesh, read_sequence, write_sequence
+from vermilion.tables import read_table
+from vermilion.video import VideoReader
+
+pytestmark = pytest.mark.slow
+
+
+def apply_chunk(scene, frames, pictures, out):
+    """Correct some frames as one chunk."""
+    take = scene.root / f"takes/{SUBJECT}/rom"
+    first, last = frames[0], frames[-1]
+    name = f"{first:06d}-{last:06d}"
+    coarse, given = (out / f"in/{name}.npy"), (out / f"in/{name}.npz")
+    meshes = read_sequence([take / f"tracking/C/{c}.npy" for c in CHUNKS])
+    write_sequence(coarse, meshes[first : last + 1])
+    arrays = [load_arrays(take / f"correction/features/{c}.npz") for c in CHUNKS]
+    joined = {
+        key: np.concatenate([part[key] for part in arrays])[first : last + 1]
+        for key in ("features", "valid")
+    }
+    save_arrays(given, joined)
+    run_script(
+        "apply",
+        wildcards={"subject": SUBJECT, "take": "rom"},
+        params={
+            "cfg": CFG, "frames": list(frames), "fps": 25.0, "source": str(pictures), "camera": "face2"
+        },
+        input={
+            "tracker": scene.root / "face/tracker.npz",
+            "identity": scene.root / f"subjects/{SUBJECT}/identity.npz",
+            "fit": take / "tracking/fit.npz",
+            "coarse": coarse,
+            "features": given,
+            "model": scene.root / "models/MS.h5",
+        },
+        output={
+            "corrected": out / f"{name}.npy",
+            "overlay": out / f"{name}.mp4",
+            "quality": out / f"{name}.tsv",
+        },
+    )  # fmt: skip
+    return name
+
+
+def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path):
+    pictures = tmp_path / "pictures"
+    for frame in range(12):
+        if frame != 7:  # a picture that is missing does not stop the take
+            write_srgb8(pictures / f"{frame:06d}.png", np.full((400, 320, 3), 100, np.uint8))
+    whole = apply_chunk(scene, range(12), pictures, tmp_path / "whole")
+    parts = [
+        apply_chunk(scene, part, pictures, tmp_path / "parts") for part in (range(5), range(5, 12))
+    ]
+    at_once = read_sequence(tmp_path / f"whole/{whole}.npy")
+    in_parts = read_sequence([tmp_path / f"parts/{part}.npy" for part in parts])
+    tolerance_mm = 0.01
+    assert np.abs(at_once - in_parts).max() < tolerance_mm
+    flagged = read_table(tmp_path / f"whole/{whole}.tsv").query("valid == 0")
+    assert flagged["frame"].tolist() == [BAD_FRAME]
+
+    take, out = scene.root / f"takes/{SUBJECT}/rom", tmp_path / "out"
+    fit = load_arrays(take / "tracking/fit.npz")
+    per_frame = {
+        "frames", "weights", "world_from_head_rotation", "world_from_head_translation_mm", "valid",
+        "reprojection_px",
+    }  # fmt: skip
+    save_arrays(out / "fit.npz", {k: v[:12] if k in per_frame else v for k, v in fit.items()})
+    run_script(
+        "apply_export",
+        wildcards={"subject": SUBJECT, "take": "rom"},
+        params={"cfg": CFG, "fps": 25.0},
+        input={
+            "tracker": scene.root / "face/tracker.npz",
+            "fit": out / "fit.npz",
+            "corrected": [tmp_path / f"parts/{part}.npy" for part in parts],
+            "overlays": [tmp_path / f"parts/{part}.mp4" for part in parts],
+            "quality": [tmp_path / f"parts/{part}.tsv" for part in parts],
+        },
+        output={
+            name: out / file
+            for name, file in {
+                "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
+                "overlay": "overlay.mp4", "usd": "corrected.usdc", "obj": "obj",
+                "timeline": "timeline.png",
+            }.items()
+        },
+    )  # fmt: skip
+    assert VideoReader(out / "overlay.mp4").n_frames == 12
+    assert len(pd.read_csv(out / "weights.csv")) == 12
+    assert cv2.imread(str(out / "timeline.png")).shape[1] > 500
+    assert (out / "corrected.usdc").stat().st_size > 1000
+    assert len(list((out / "obj").glob("*.obj"))) == 12
+    mesh = read_mesh(out / "obj/000003.obj")
+    assert np.abs(mesh.vertices_mm - at_once[3]).max() < 1e-3

@@ -1,0 +1,51 @@
+"""Lip shapes of the training takes, for the contour baseline (Lips16 6)."""
+
+from functools import reduce
+
+import numpy as np
+
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation.files import read_frames
+from vermilion.evaluation.lip_shapes import PosedTake, choose_lip_shapes
+from vermilion.faces.model import FaceModel
+from vermilion.logfile import log_to
+from vermilion.progress import progress
+from vermilion.tables import read_table
+
+
+def posed(take, chunks, qualities, neutral, correspondence):
+    """The frames of a take that train and were reconstructed."""
+    bad = set()
+    for path in qualities:
+        table = read_table(path, ["frame", "valid"])
+        bad |= set(table.loc[table["valid"] == 0, "frame"])
+    frames = np.array([frame for frame in take["train"] if frame not in bad], dtype=int)
+    with np.load(neutral) as data:
+        return PosedTake.of(
+            take["take"], frames, read_frames(chunks, frames), data["vertices_mm"], correspondence
+        )
+
+
+def main(snakemake):
+    inputs, params = snakemake.input, snakemake.params
+    people = dict(
+        zip(params.subjects, map(Correspondence.load, inputs.correspondence), strict=True)
+    )
+    accurate, quality = iter(inputs.accurate), iter(inputs.accurate_quality)
+    takes = []
+    for take, neutral in progress(list(zip(params.takes, inputs.neutrals, strict=True)), "takes"):
+        files = [[next(paths) for _ in range(take["chunks"])] for paths in (accurate, quality)]
+        takes.append(posed(take, *files, neutral, people[take["take"].split("/")[0]]))
+    model = FaceModel.load(inputs.tracker)
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+    mask = reduce(np.intersect1d, (person.mask for person in people.values()))
+    count = params.cfg["evaluation.contour"]["shapes"]
+    shapes = choose_lip_shapes(takes, lips, mask, model.triangles, count)
+    for take, frame in zip(shapes.take, shapes.frame, strict=True):
+        print(f"{take}, frame {frame}")
+    shapes.save(snakemake.output.shapes)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
