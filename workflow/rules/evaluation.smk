@@ -17,6 +17,16 @@ def truth_files(subject, take):
     return [str(path) for path in files] if known else []
 
 
+def curve_files(take):
+    """The true expression weights of a take; none where they are not known."""
+    if take.source == STUDIO:
+        return [f"{R}/truth/{take.name}/weights.json"]
+    if not CONFIG.evaluation.truth:
+        return []
+    path = Path(CONFIG.evaluation.truth) / take.name / "weights.json"
+    return [str(path)] if path.is_file() else []
+
+
 def neutral_truth_files(subject):
     """Truth of the take whose first frame is the subject's neutral, in the world of H."""
     neutral = takes("tattoo", subject)
@@ -66,6 +76,8 @@ def evaluate_inputs(wildcards):
         neutral = takes("tattoo", take.subject)[0].take
         pattern = R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"
         inputs["truth"] = truth_files(take.subject, take.take)
+        if curve_files(take):
+            inputs["curves"] = curve_files(take)[0]
         inputs["neutral_truth"] = neutral_truth_files(take.subject)
         inputs["neutral_accurate"] = expand_chunks(pattern, take.subject, neutral)[0]
     else:
@@ -245,6 +257,12 @@ rule measures:
             category="Tables",
             labels={"table": "all measures"},
             caption="../report/measures.rst",
+        ),
+        kinds=report(
+            R + "/evaluation/kinds.tsv",
+            category="Tables",
+            labels={"table": "kinds of mouth shapes"},
+            caption="../report/kinds.rst",
         ),
         table1=report(
             R + "/evaluation/table1.tsv",

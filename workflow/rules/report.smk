@@ -94,6 +94,7 @@ rule summary:
     input:
         measures=R + "/evaluation/measures.tsv",
         table1=R + "/evaluation/table1.tsv",
+        kinds=R + "/evaluation/kinds.tsv",
         picture=R + "/evaluation/table1.png",
         quality=R + "/quality.tsv",
         maps=of_takes(EVALUATED + "/error_maps.png", evaluated_takes()),

@@ -1,5 +1,6 @@
 """Every regressor on the held-out frames of a take, against truth or against held-out H."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -46,20 +47,31 @@ def reference(snakemake, tracker, correspondence, frames):
     inputs = snakemake.input
     if not inputs.get("truth"):
         vertices = read_frames(inputs.accurate, frames)
+        neutral = read_frames(inputs.accurate, [snakemake.params.first])[0]
         where = held_out.points_on_h(correspondence)
-        return reference_of("H", where, vertices, correspondence.accurate_triangles)
+        return reference_of("H", where, vertices, correspondence.accurate_triangles, neutral)
     triangles = np.load(inputs.neutral_truth[1])
+    neutral = np.load(inputs.neutral_truth[0], mmap_mode="r")[0]
     where = held_out.points_on_truth(
         correspondence,
         tracker,
         FaceModel.load(inputs.template),
         read_sequence(inputs.neutral_accurate)[0],
-        np.load(inputs.neutral_truth[0], mmap_mode="r")[0],
+        neutral,
         triangles,
         **ReferenceConfig(**snakemake.params.cfg["evaluation.reference"]).model_dump(),
     )
     sequence = np.load(inputs.truth[0], mmap_mode="r")[frames - snakemake.params.first]
-    return reference_of("truth", where, sequence, triangles)
+    return reference_of("truth", where, sequence, triangles, neutral)
+
+
+def true_curves(snakemake, frames):
+    """Expression weights of the frames, a dict each; None where they are not known."""
+    path = snakemake.input.get("curves")
+    if not path:
+        return None
+    curves = json.loads(Path(path).read_text(encoding="utf-8"))
+    return [curves[frame - snakemake.params.first] for frame in frames]
 
 
 def coarse_take(inputs, tracker, fit, frames, integration):
@@ -122,6 +134,7 @@ def main(snakemake):
     result = evaluate_take(
         sequences, frames, tracker, regions, reference(snakemake, tracker, correspondence, frames),
         options.clip_frames, options.min_clips, options.touch_mm, options.gape_mm,
+        true_curves(snakemake, frames),
     )  # fmt: skip
 
     sums = dict(result.sums)

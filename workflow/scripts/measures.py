@@ -5,6 +5,7 @@ import pandas as pd
 from vermilion.config.evaluation import MeasuresConfig
 from vermilion.evaluation.figures import bars
 from vermilion.evaluation.files import load_sums
+from vermilion.evaluation.kind_errors import kind_rows
 from vermilion.evaluation.measures import COLUMNS, seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.evaluation.table1 import table1
@@ -28,6 +29,7 @@ def main(snakemake):
         tables.append(seconds_rows([read_table(path) for path in snakemake.input.seconds], frames))
     measures = pd.concat([table for table in tables if len(table)] or tables[:1], ignore_index=True)
     write_table(snakemake.output.measures, measures)
+    write_table(snakemake.output.kinds, kind_rows(takes, *pooled))
     summary = table1(measures)
     write_table(snakemake.output.table1, summary)
     bars(summary, snakemake.output.picture)

@@ -31,6 +31,7 @@ def main(snakemake):
     found = Findings(
         measures=read_table(inputs.measures),
         table1=read_table(inputs.table1),
+        kinds=read_table(inputs.kinds),
         flagged=read_table(inputs.quality),
         table1_picture=Path(inputs.picture),
         error_maps=named("maps", inputs.maps),

@@ -93,10 +93,8 @@ def sums_of_errors(
     """Sums behind vertex and surface errors, of (F, V) errors and the clip of each frame (F,)."""
     sums = {}
     for region, weights in regions.weights.items():
-        sums[f"{region}.weight"], sums[f"{region}.error"] = _weighted_sums(
-            vertex_mm, weights, clips
-        )
-        _, sums[f"{region}.square"] = _weighted_sums(vertex_mm**2, weights, clips)
+        sums[f"{region}.weight"], sums[f"{region}.error"] = weighted_sums(vertex_mm, weights, clips)
+        _, sums[f"{region}.square"] = weighted_sums(vertex_mm**2, weights, clips)
         inside = np.where(weights > 0, surface_mm, np.nan)
         sums[f"{region}.histogram"] = by_clip(histograms(inside, weights), clips)
         largest = np.nan_to_num(inside).max(axis=1)
@@ -117,7 +115,7 @@ def sums_of_jitter(
     )
     sums = {}
     for region, weights in regions.weights.items():
-        weight, jitter = _weighted_sums(excess, weights, clips)
+        weight, jitter = weighted_sums(excess, weights, clips)
         sums[f"{region}.jitter_weight"], sums[f"{region}.jitter"] = weight, jitter
     return ClipSums(sums)
 
@@ -126,7 +124,7 @@ def sums_of_drift(drift_mm: np.ndarray, regions: Regions, clips: np.ndarray) -> 
     """Sums behind `drift_mm`, of (F, V) mm; NaN does not count."""
     sums = {}
     for region, weights in regions.weights.items():
-        weight, total = _weighted_sums(drift_mm, weights, clips)
+        weight, total = weighted_sums(drift_mm, weights, clips)
         sums[f"{region}.drift_weight"], sums[f"{region}.drift"] = weight, total
     return ClipSums(sums)
 
@@ -185,7 +183,7 @@ def by_clip(values: np.ndarray, clips: np.ndarray, combine: np.ufunc = np.add) -
     return result
 
 
-def _weighted_sums(
+def weighted_sums(
     values: np.ndarray, weights: np.ndarray, clips: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum of weights and of weighted values of each clip, (clips,) each."""

@@ -126,7 +126,7 @@ def error_map_arrays(
     """
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = map_frames(base, count)
-    turn = result.head_rotations[chosen].transpose(0, 2, 1)
+    turn = result.head[0][chosen].transpose(0, 2, 1)
     names = list(result.aligned_mm)
     return {
         "frames": frames[chosen],

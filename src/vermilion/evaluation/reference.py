@@ -21,12 +21,19 @@ class Reference:
         points_mm: (F, V, 3) where each vertex of the compared topology belongs; NaN where unknown.
         vertices_mm: (F, S, 3) the surface itself.
         triangles: (U, 3) of the surface.
+        neutral_mm: (V, 3) the points in the neutral, any head pose; None: the first frame is it.
     """
 
     kind: str
     points_mm: np.ndarray
     vertices_mm: np.ndarray
     triangles: np.ndarray
+    neutral_mm: np.ndarray | None = None
+
+    @property
+    def rest_mm(self) -> np.ndarray:
+        """(V, 3) the points in the neutral."""
+        return self.points_mm[0] if self.neutral_mm is None else self.neutral_mm
 
     @property
     def valid(self) -> np.ndarray:
@@ -35,9 +42,15 @@ class Reference:
 
 
 def reference_of(
-    kind: str, where: SurfacePoints, vertices_mm: np.ndarray, triangles: np.ndarray
+    kind: str,
+    where: SurfacePoints,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    neutral_mm: np.ndarray | None = None,
 ) -> Reference:
     """Follow `where` (V points on the surface) through the surface's frames (F, S, 3).
+
+    `neutral_mm` (S, 3) is the surface at the neutral.
 
     The surface is cropped to the surroundings of the points in the first frame: the back of a head
     is no neighbour of a face.
@@ -46,7 +59,10 @@ def reference_of(
     first = points[0][np.isfinite(points[0]).all(axis=1)]
     low, high = first.min(axis=0) - _CROP_MARGIN_MM, first.max(axis=0) + _CROP_MARGIN_MM
     near = ((vertices_mm[0] >= low) & (vertices_mm[0] <= high)).all(axis=1)
-    return Reference(kind, points, vertices_mm, triangles[near[triangles].all(axis=1)])
+    if neutral_mm is not None:
+        neutral_mm = where.on(np.asarray(neutral_mm, dtype=np.float64), triangles)
+    kept = triangles[near[triangles].all(axis=1)]
+    return Reference(kind, points, vertices_mm, kept, neutral_mm)
 
 
 def attach(

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from vermilion import page
+from vermilion.evaluation.mouth_kinds import KINDS
 from vermilion.evaluation.table1 import in_order, place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "held_out", "against")
@@ -32,7 +34,7 @@ class Findings:
     """What the page shows.
 
     Attributes:
-        measures, table1, flagged: tables.
+        measures, table1, kinds, flagged: tables.
         table1_picture: file.
         error_maps, over_time, curve_pictures: (name, file) pairs.
         overlays: pictures of the stages.
@@ -43,6 +45,7 @@ class Findings:
 
     measures: pd.DataFrame
     table1: pd.DataFrame
+    kinds: pd.DataFrame
     flagged: pd.DataFrame
     table1_picture: Path
     error_maps: Sequence[tuple[str, Path]]
@@ -68,6 +71,7 @@ def summary_page(found: Findings, embed_video_mb: float) -> str:
             ("Corrected takes", _videos(found, embed_video_mb)),
             ("Error maps", "".join(page.picture(p, _MAP_CAPTION.format(n)) for n, p in found.error_maps)),
             ("Over time", "".join(page.picture(p, f"{n}: held-out frames.") for n, p in found.over_time)),
+            ("Kinds of mouth shapes", _kinds(found.kinds)),
             ("Further measures", _further(found.measures)),
             ("Accuracy of H", _reconstruction(found.measures)),
             ("Training", "".join(page.picture(p, f"{n}: cross-validation error.") for n, p in found.curve_pictures)),
@@ -122,6 +126,25 @@ def _table1(found: Findings) -> str:
         "and GR on its own data."
     )
     return page.table(rows, headings, "where") + page.picture(found.table1_picture, caption)
+
+
+def _kinds(kinds: pd.DataFrame) -> str:
+    rows = kinds[(kinds["region"] == "mouth")].reset_index(drop=True)
+    if rows.empty:
+        return ""
+    headings = {
+        "kind": "kind", "regressor": "regressor", "mean_mm": "mean, mm", "low_mm": "low",
+        "high_mm": "high", "ratio_to_base": "of base", "ratio_low": "low", "ratio_high": "high",
+        "frames": "frames", "clips": "clips",
+    }  # fmt: skip
+    order = rows["kind"].map({kind: k for k, kind in enumerate(KINDS)})
+    rows = rows.iloc[np.argsort(order, kind="stable")]
+    rows = rows[~rows["regressor"].str.contains("/")]
+    note = (
+        "<p>Mean vertex error over the mouth mask by kind of mouth shape, all takes together. The vermilion "
+        "alone, and variants, are in <code>kinds.tsv</code>.</p>"
+    )
+    return note + page.table(rows, headings, "kind")
 
 
 def _further(measures: pd.DataFrame) -> str:
@@ -222,6 +245,9 @@ seven columns of the middle half of the mouth, in the head frame. Jitter: mean s
 time, less that of the truth. Contour error: distance of contour points found in the picture to the
 projected contours of the mesh, per inter-ocular distance. Feature error: RMS of regressed against true
 layer entries.</p>
+<p><b>Kinds of mouth shapes.</b> By the true expression weights where they are known, each over a threshold
+(pucker or funnel, rolls, presses, jaw, smiles), else by width, gap, height of the red and protrusion of the
+reference's lips against its neutral; speech is what lies between.</p>
 <p><b>Intervals.</b> Percentile bootstrap over clips of consecutive frames; every regressor is measured on
 the same draws, so that ratios compare like with like. With one clip there is no interval.</p>
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +20,10 @@ from vermilion.evaluation.errors import (
     surface_errors,
     vertex_errors,
 )
+from vermilion.evaluation.kind_errors import sums_of_kinds
 from vermilion.evaluation.lips import aperture_mm, columns_of, lip_sides
 from vermilion.evaluation.masks import Regions
+from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
 from vermilion.faces.model import FaceModel
@@ -33,11 +36,12 @@ class TakeResult:
 
     Attributes:
         sums: regressor -> sums by clip, for `measure_rows`.
-        table: per frame and regressor: frame, regressor, vermilion_mm, mouth_mm, aperture_mm; the
+        table: per frame and regressor: frame, regressor, kind, vermilion_mm, mouth_mm, aperture_mm; the
             regressor `truth` has its aperture alone.
         aligned_mm: regressor -> (F, V, 3) in the reference's world.
         errors_mm: regressor -> (F, V) vertex error; NaN where a vertex has no counterpart.
-        head_rotations: (F, 3, 3) from the reference's world to the head frame.
+        head: (F, 3, 3) and (F, 3), from the reference's world to the head frame.
+        kinds: (F,) kind of mouth shape.
         clips: (F,) clip of each frame.
     """
 
@@ -45,7 +49,8 @@ class TakeResult:
     table: pd.DataFrame
     aligned_mm: dict[str, np.ndarray]
     errors_mm: dict[str, np.ndarray]
-    head_rotations: np.ndarray
+    head: tuple[np.ndarray, np.ndarray]
+    kinds: np.ndarray
     clips: np.ndarray
 
 
@@ -59,6 +64,7 @@ def evaluate_take(
     min_clips: int,
     touch_mm: float,
     gape_mm: float,
+    curves: Sequence[Mapping[str, float]] | None = None,
 ) -> TakeResult:
     """Measure `base` and its corrections after one rigid alignment a frame.
 
@@ -71,12 +77,21 @@ def evaluate_take(
         regions: of the topology of the sequences; vertices without a counterpart are left out here.
         reference: of the same frames.
         clip_frames, min_clips: of `clips_of`.
+        curves: true expression weights of the frames, by which the kinds of mouth shapes are known;
+            without them the reference's shape decides.
     """
     regions = regions.restricted(reference.valid)
     rotations, translations = align_frames(sequences_mm["base"], reference.points_mm, regions.rest)
     aligned = {name: moved(s, rotations, translations) for name, s in sequences_mm.items()}
     neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
-    head_rotations, _ = align_frames(reference.points_mm, neutral, regions.rest)
+    head_rotations, head_translations = align_frames(reference.points_mm, neutral, regions.rest)
+    if curves is not None:
+        kinds = kinds_of_curves(curves)
+    else:
+        rest = reference.rest_mm[None]
+        rest = moved(rest, *align_frames(rest, neutral[:1], regions.rest))[0]
+        posed = moved(reference.points_mm, head_rotations, head_translations)
+        kinds = kinds_of_shapes(posed, rest, model, reference.valid)
     clips = clips_of(frames, clip_frames, min_clips)
     sides, columns = lip_sides(model), columns_of(model)
     true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
@@ -85,7 +100,7 @@ def evaluate_take(
     )
     # A lip vertex that has no counterpart is left out of both gaps.
     columns = np.where(reference.valid, columns, -1)
-    sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps)]
+    sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
         gaps = gaps_in_head(sequence, head_rotations, sides, columns)
         errors[name] = vertex_errors(sequence, reference)
@@ -93,10 +108,12 @@ def evaluate_take(
             sums_of_errors(errors[name], surface[name], regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, touch_mm, gape_mm)
+            + sums_of_kinds(errors[name], kinds, regions, clips)
         )
-        rows.append(_frame_rows(name, frames, errors[name], regions, gaps))
+        rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
-    return TakeResult(sums, table, aligned, errors, head_rotations, clips)
+    head = head_rotations, head_translations
+    return TakeResult(sums, table, aligned, errors, head, kinds, clips)
 
 
 def evaluate_reconstruction(
@@ -158,8 +175,9 @@ def _frame_rows(
     errors_mm: np.ndarray | None,
     regions: Regions,
     gaps: np.ndarray,
+    kinds: np.ndarray,
 ) -> pd.DataFrame:
-    columns = {"frame": frames, "regressor": name}
+    columns = {"frame": frames, "regressor": name, "kind": kinds}
     for region in ("vermilion", "mouth"):
         weights = regions.weights[region]
         value = np.full(len(frames), np.nan)

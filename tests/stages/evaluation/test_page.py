@@ -29,6 +29,7 @@ def test_tables_figures_and_page(scene):
         },
         output={
             "measures": ev / "measures.tsv",
+            "kinds": ev / "kinds.tsv",
             "table1": ev / "table1.tsv",
             "picture": ev / "table1.png",
         },
@@ -82,6 +83,7 @@ def write_page(root, ev):
         },
         input={
             "measures": ev / "measures.tsv",
+            "kinds": ev / "kinds.tsv",
             "table1": ev / "table1.tsv",
             "picture": ev / "table1.png",
             "quality": root / "quality.tsv",
