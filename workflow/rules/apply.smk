@@ -46,7 +46,7 @@ rule apply:
     """Corrects a chunk of a take and draws original, base and corrected side by side."""
     input:
         unpack(mono_inputs),
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
@@ -77,7 +77,7 @@ rule apply:
 rule apply_export:
     """Joins the chunks of a take into the files that Blender, Maya or Unreal open."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         corrected=per_chunk(APPLIED + "/chunks/{chunk}.npy"),
         overlays=per_chunk(APPLIED + "/chunks/{chunk}.mp4"),

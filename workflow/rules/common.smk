@@ -143,6 +143,13 @@ def mono_source(wildcards):
     return source_of(wildcards)
 
 
+def tracker_of(wildcards):
+    """The tracker's face model for a subject: their own, made from a scan, or everybody's."""
+    if wildcards.subject in CONFIG.tracking.scans:
+        return f"{R}/subjects/{wildcards.subject}/tracker.npz"
+    return f"{R}/face/tracker.npz"
+
+
 def mono_camera(wildcards):
     """Name of the monocular camera: the frontal one of a rig, the only one of a video."""
     take = take_of(wildcards)

@@ -10,7 +10,7 @@ rule layers:
         coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
     output:
         layers=R + "/takes/{subject}/{take}/correction/layers/{chunk}.npz",
         quality=R + "/takes/{subject}/{take}/correction/quality/{chunk}.tsv",

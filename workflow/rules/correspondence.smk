@@ -23,7 +23,7 @@ rule correspondence:
     """Lays the coarse neutral over the accurate one and binds every triangle: correspondence.npz."""
     input:
         template=R + "/face/template.npz",
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         accurate=of_reference_take(R + "/takes/{subject}/{take}/multiview/neutral.npz"),
         coarse=of_reference_take(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
         fit=of_reference_take(R + "/takes/{subject}/{take}/tracking/fit.npz"),

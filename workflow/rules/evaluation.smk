@@ -112,7 +112,7 @@ def of_training_chunks(pattern):
 rule lip_shapes:
     """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         correspondence=[f"{R}/subjects/{name}/correspondence.npz" for name in trained_subjects()],
         accurate=of_training_chunks("multiview/H/{chunk}.npy"),
         accurate_quality=of_training_chunks("multiview/quality/{chunk}.tsv"),
@@ -146,7 +146,7 @@ rule evaluate:
     """Applies every regressor to the held-out frames of a take and measures: measures.tsv."""
     input:
         unpack(evaluate_inputs),
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         template=R + "/face/template.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         identity=R + "/subjects/{subject}/identity.npz",

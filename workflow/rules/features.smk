@@ -5,6 +5,7 @@ rule features:
     """Measures the contours from the coarse meshes of a chunk: features/{chunk}.npz (F, M)."""
     input:
         unpack(mono_inputs),
+        # Everybody's model, also for those with a scan: shape features have one basis for all people.
         model=R + "/face/tracker.npz",
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",

@@ -37,6 +37,7 @@ def quality_files():
     ]
     people = subjects("tattoo")
     paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
+    paths += [f"{R}/subjects/{name}/scan/quality/scan.tsv" for name in CONFIG.tracking.scans]
     paths += of_takes(EVALUATED + "/quality.tsv", evaluated_takes())
     for name in applied_takes():
         paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))

@@ -38,7 +38,7 @@ def of_identity_takes(pattern):
 rule identity:
     """Finds the person in landmarks of frames of all takes: subjects/{subject}/identity.npz."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
         calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
@@ -70,7 +70,7 @@ rule identity:
 rule tracking:
     """Fits pose and blend weights of a whole take to its landmarks: tracking/fit.npz."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         cameras=R + "/takes/{subject}/{take}/cameras",
@@ -96,7 +96,7 @@ rule tracking_meshes:
     """Writes C of a chunk in the world, and the model over the pictures: tracking/C/{chunk}.npy."""
     input:
         unpack(mono_inputs),
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
@@ -123,7 +123,7 @@ rule tracking_meshes:
 rule tracking_topology:
     """Writes the triangles of C beside its chunks: tracking/C/topology.ply."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
     output:
         R + "/takes/{subject}/{take}/tracking/C/topology.ply",

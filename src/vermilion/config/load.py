@@ -103,6 +103,17 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"{origin}, key studio.subjects.{name}: found a subject without takes; "
                 "expected a row of the take sheet. Add one or remove the subject."
             )
+    for name, scan in configuration.tracking.scans.items():
+        key = f"{origin}, key tracking.scans.{name}"
+        if name not in subjects:
+            problems.append(
+                f"{key}: found a subject without takes; expected one of {', '.join(sorted(subjects))}."
+            )
+        if configuration.landmarks.detector == "csv" and not scan.landmarks:
+            problems.append(
+                f"{key}.landmarks: found nothing; expected a file, as landmarks.detector is `csv` and "
+                "nothing looks for landmarks in pictures."
+            )
     for name in configuration.apply.takes:
         if name not in by_name:
             problems.append(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from vermilion.config.base import StageConfig
@@ -118,6 +120,32 @@ class ExternalConfig(StageConfig):
     )
 
 
+class ScanConfig(StageConfig):
+    """A 3D scan of a person, from which the tracker's model of that person is made (Mono13 4)."""
+
+    path: str = Field(
+        min_length=1, description="OBJ, PLY or STL of a head or face: any topology, unit and frame."
+    )
+    eyes: Literal["open", "closed"] = Field("open", description="Whether the scan's lids are shut.")
+    landmarks: str | None = Field(
+        None,
+        description="Landmarks given by hand: a TSV with columns landmark (0 to 65), x, y, z in the "
+        "scan's frame. Empty: they are found in rendered views.",
+    )
+    unit_mm: float | None = Field(
+        None,
+        gt=0,
+        le=1e6,
+        description="Length of a unit in the file (mm). Empty: the size of the model's head.",
+    )
+    finest_mm: float = Field(
+        4.0,
+        ge=1,
+        le=50,
+        description="Detail of the scan that is finer is smoothed away (wavelength, mm).",
+    )
+
+
 class TrackingConfig(StageConfig):
     """The coarse monocular track (Lips16 3.2, Mono13 6)."""
 
@@ -127,6 +155,11 @@ class TrackingConfig(StageConfig):
     identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
     motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
     meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")
+    scans: dict[str, ScanConfig] = Field(
+        default_factory=dict,
+        description="Subject -> scan, for those whose face model comes from one; the others' comes "
+        "from the identity that their takes show.",
+    )
     external: ExternalConfig = Field(
         default_factory=ExternalConfig, description="Mesh sequences of other trackers."
     )

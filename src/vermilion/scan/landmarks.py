@@ -1,0 +1,165 @@
+"""The landmarks of a scan: found in rendered views, or given by hand."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vermilion.correspondence.registration import similarity_alignment
+from vermilion.errors import InputError
+from vermilion.landmarks.detector import LandmarkDetector
+from vermilion.landmarks.scheme import JAW, N_LANDMARKS
+from vermilion.mesh import Mesh
+from vermilion.scan.views import ScanViews, camera_towards
+from vermilion.tables import read_table, write_table
+
+INNER = np.arange(len(JAW), N_LANDMARKS)  # the jaw line is a silhouette: another one in each view
+LEAST_GIVEN = 6
+_SIZE_PX = 480
+_YAWS_DEG, _PITCHES_DEG = (-20.0, -10.0, 0.0, 10.0, 20.0), (-10.0, 0.0, 10.0)
+
+
+@dataclass(frozen=True)
+class ScanLandmarks:
+    """Landmarks on a scan.
+
+    Attributes:
+        points: (66, 3) in the scan's units and frame, NaN where unknown.
+        spread: (66,) how far views differ, same unit; zero where given by hand.
+    """
+
+    points: np.ndarray
+    spread: np.ndarray
+
+    @property
+    def known(self) -> np.ndarray:
+        """(66,) bool."""
+        return np.isfinite(self.points).all(axis=1)
+
+
+def find_landmarks(
+    scan: Mesh, detector: LandmarkDetector, generic: np.ndarray, subject: str | None = None
+) -> ScanLandmarks:
+    """Landmarks of a scan of unknown size and orientation.
+
+    A face is looked for from six sides with four ways up each; then around the best of them, in
+    fifteen views. A landmark is the median of the places on the surface that the views' rays meet.
+
+    Args:
+        scan: in any unit and frame.
+        detector: works on pictures.
+        generic: (66, 3) mm landmarks of the face model's neutral, which say what is front and up.
+
+    Raises:
+        InputError: no face found.
+    """
+    views = ScanViews(scan)
+    points = _first_look(views, detector)
+    if points is None:
+        raise InputError(
+            "no face in 24 views of the scan",
+            "a head or face whose surface the landmark detector knows",
+            "Look at the scan in a viewer; cut off what hides the face, or give the landmarks by "
+            "hand (tracking.scan_landmarks).",
+            subject=subject,
+        )
+    for _ in range(2):  # the second time the views are where they should be
+        scale, rotation, _ = _head_from_scan(points, generic)
+        points, spread = _all_views(views, detector, points, scale, rotation)
+    return ScanLandmarks(points, spread)
+
+
+def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmarks:
+    """Landmarks given by hand: a table with the columns landmark (0 to 65), x, y, z.
+
+    Raises InputError where there are fewer than six, or numbers that are no landmarks.
+    """
+    table = read_table(path, ["landmark", "x", "y", "z"])
+    numbers = table["landmark"].to_numpy()
+    wrong = sorted(set(numbers.tolist()) - set(range(N_LANDMARKS)))
+    if wrong or len(set(numbers)) < LEAST_GIVEN:
+        raise InputError(
+            f"landmarks {wrong}" if wrong else f"{len(set(numbers))} landmarks",
+            f"at least {LEAST_GIVEN} of the numbers 0 to {N_LANDMARKS - 1}",
+            "See docs/scan.md for what the numbers mean.",
+            subject=subject,
+            path=path,
+        )
+    points = np.full((N_LANDMARKS, 3), np.nan)
+    points[numbers] = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
+    return ScanLandmarks(points, np.zeros(N_LANDMARKS))
+
+
+def write_landmarks(path: str | Path, landmarks: ScanLandmarks) -> None:
+    """Write what `read_landmarks` reads, so that found landmarks can be corrected by hand."""
+    numbers = np.flatnonzero(landmarks.known)
+    x, y, z = landmarks.points[numbers].T
+    write_table(path, pd.DataFrame({"landmark": numbers, "x": x, "y": y, "z": z}))
+
+
+def _first_look(views: ScanViews, detector: LandmarkDetector) -> np.ndarray | None:
+    """Points (66, 3) of the view with the surest face; None where no view has one."""
+    low, high = views.mesh.vertices_mm.min(axis=0), views.mesh.vertices_mm.max(axis=0)
+    middle, size = (low + high) / 2, 1.1 * float((high - low).max())
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    # z to the front and y up first: most scans stand so, and a sure face ends the search.
+    pairs = sorted(
+        ((f, u) for f, u in itertools.permutations(range(6), 2) if f % 3 != u % 3),
+        key=lambda pair: pair != (2, 1),
+    )
+    best, sure = None, 0.0
+    for front, up in pairs:
+        camera = camera_towards(middle, size, axes[front], axes[up], _SIZE_PX)
+        found, points = views.landmarks(camera, detector)
+        known = np.isfinite(points[INNER]).all(axis=1)
+        if not found.found or known.mean() < 0.8:
+            continue
+        confidence = float(found.confidence.mean())
+        if confidence > sure:
+            best, sure = points, confidence
+        if sure > 0.75:
+            break
+    return best
+
+
+def _head_from_scan(points: np.ndarray, generic: np.ndarray):
+    """Similarity that brings the scan's landmarks onto the model's: the head frame in mm."""
+    known = INNER[np.isfinite(points[INNER]).all(axis=1)]
+    return similarity_alignment(points[known], generic[known])
+
+
+def _all_views(
+    views: ScanViews,
+    detector: LandmarkDetector,
+    points: np.ndarray,
+    scale: float,
+    rotation: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Median (66, 3) and spread (66,) over views round the face."""
+    middle, seen = np.nanmedian(points, axis=0), []
+    for yaw, pitch in itertools.product(np.radians(_YAWS_DEG), np.radians(_PITCHES_DEG)):
+        front = [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
+        camera = camera_towards(
+            middle, 260.0 / scale, np.array(front) @ rotation, rotation[1], _SIZE_PX
+        )
+        seen.append(views.landmarks(camera, detector)[1])
+    return _median(seen)
+
+
+def _median(seen: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    stack = np.stack(seen)
+    known = np.isfinite(stack).all(axis=-1)
+    enough = known.sum(axis=0) >= max(len(seen) // 3, 1)
+    stack = np.where((known & enough)[..., None], stack, np.nan)
+    with np.errstate(all="ignore"):
+        middle = np.full(stack.shape[1:], np.nan)
+        middle[enough] = np.nanmedian(stack[:, enough], axis=0)
+        apart = np.linalg.norm(stack - middle, axis=-1)
+        spread = np.zeros(len(middle))
+        spread[enough] = 1.48 * np.nanmedian(apart[:, enough], axis=0)
+    return middle, spread

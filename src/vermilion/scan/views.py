@@ -1,0 +1,70 @@
+"""Pictures of a scan, and the landmarks that a detector finds in them, put back on its surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.camera import Camera, look_at, pinhole
+from vermilion.landmarks.detector import LandmarkDetector, Landmarks
+from vermilion.landmarks.scheme import N_LANDMARKS
+from vermilion.mesh import Mesh, normalised, vertex_normals
+from vermilion.raycast import RayCaster, interpolate
+
+_SKIN = np.array([0.42, 0.30, 0.24])
+_BACKGROUND = 0.15
+
+
+@dataclass(frozen=True)
+class ScanViews:
+    """A scan that can be looked at from anywhere; build it once.
+
+    Attributes:
+        mesh: the scan, in any unit.
+    """
+
+    mesh: Mesh
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_caster", RayCaster(self.mesh.vertices_mm, self.mesh.triangles))
+        object.__setattr__(
+            self, "_normals", vertex_normals(self.mesh.vertices_mm, self.mesh.triangles)
+        )
+
+    def picture(self, camera: Camera) -> np.ndarray:
+        """The bare surface in a lamp above the camera, (h, w, 3) linear in [0, 1].
+
+        Colours of the scan are not used: lips and brows have enough shape, and paint or shadow
+        baked into a texture can mislead.
+        """
+        origins, directions = camera.rays(camera.pixel_grid())
+        hits = self._caster.cast(origins, directions)
+        normals = normalised(interpolate(hits, self.mesh.triangles, self._normals))
+        lamp = normalised(-directions + 0.5 * -camera.rotation[1])
+        shade = 0.08 + 0.92 * np.abs((normals * lamp).sum(axis=-1))
+        return np.where(hits.hit[..., None], shade[..., None] * _SKIN, _BACKGROUND)
+
+    def on_surface(self, camera: Camera, points_px: np.ndarray) -> np.ndarray:
+        """Where pixels (n, 2) meet the scan, (n, 3); NaN where they miss it."""
+        origins, directions = camera.rays(points_px)
+        distance = self._caster.cast(origins, directions).distance_mm.astype(np.float64)
+        hit = np.isfinite(distance)
+        points = origins + np.where(hit, distance, 0.0)[:, None] * directions
+        return np.where(hit[:, None], points, np.nan)
+
+    def landmarks(self, camera: Camera, detector: LandmarkDetector) -> tuple[Landmarks, np.ndarray]:
+        """What the detector finds in one view, and its points (66, 3) on the surface, NaN elsewhere."""
+        found = detector.detect(self.picture(camera))
+        if not found.found:
+            return found, np.full((N_LANDMARKS, 3), np.nan)
+        return found, self.on_surface(camera, found.points_px)
+
+
+def camera_towards(
+    middle: np.ndarray, size: float, front: np.ndarray, up: np.ndarray, size_px: int
+) -> Camera:
+    """A camera in front of `middle` whose picture is `size` wide there; `front`, `up` are axes."""
+    distance = 4.0 * size
+    pose = look_at(np.asarray(middle) + distance * normalised(front), middle, up)
+    return pinhole("scan", size_px * distance / size, size_px, size_px, pose)

@@ -1,0 +1,43 @@
+"""A subject's own face model from a 3D scan (Mono13 4, Lips16 3.2): subjects/{subject}/tracker.npz."""
+
+
+def scan_of(wildcards):
+    """The configuration of a subject's scan."""
+    if wildcards.subject not in CONFIG.tracking.scans:
+        raise WorkflowError(
+            f"subject {wildcards.subject}: found no scan; expected one to make a personal face model "
+            "from. Name it under tracking.scans."
+        )
+    return CONFIG.tracking.scans[wildcards.subject]
+
+
+rule scan:
+    """Lays the tracker's model over a scan and transfers all its expressions."""
+    input:
+        tracker=R + "/face/tracker.npz",
+        scan=lambda wildcards: scan_of(wildcards).path,
+        landmarks=lambda wildcards: scan_of(wildcards).landmarks or [],
+        detector=lambda wildcards: [] if scan_of(wildcards).landmarks else detector_files(wildcards),
+    output:
+        tracker=R + "/subjects/{subject}/tracker.npz",
+        landmarks=R + "/subjects/{subject}/scan/landmarks.tsv",
+        quality=R + "/subjects/{subject}/scan/quality/scan.tsv",
+        overlay=R + "/subjects/{subject}/scan/overlay/scan.png",
+    log:
+        R + "/logs/scan/{subject}.log",
+    benchmark:
+        R + "/benchmarks/scan/{subject}.tsv"
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        cfg=lambda wildcards: {
+            "scan": scan_of(wildcards).model_dump(mode="json"),
+            **cfg_of(
+                "landmarks.detector", "landmarks.networks", "face_model.template_slight_open"
+            ),
+        },
+        code=code_of("scan"),
+        model=detector_path,
+    script:
+        "../scripts/scan.py"
