@@ -112,7 +112,7 @@ def of_training_chunks(pattern):
 rule lip_shapes:
     """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
     input:
-        tracker=tracker_of,
+        tracker=R + "/face/tracker.npz",
         correspondence=[f"{R}/subjects/{name}/correspondence.npz" for name in trained_subjects()],
         accurate=of_training_chunks("multiview/H/{chunk}.npy"),
         accurate_quality=of_training_chunks("multiview/quality/{chunk}.tsv"),
