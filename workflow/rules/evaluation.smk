@@ -95,7 +95,7 @@ EVALUATED = R + "/evaluation/takes/{subject}/{take}"
 RECONSTRUCTED = R + "/evaluation/reconstruction/{subject}/{take}"
 
 
-def training_takes():
+def takes_that_train():
     """Tattoo takes with training frames."""
     return [take for take in takes("tattoo") if take.train_frames()]
 
@@ -104,7 +104,7 @@ def of_training_chunks(pattern):
     """`pattern` for every chunk of every training take."""
     return [
         path
-        for take in training_takes()
+        for take in takes_that_train()
         for path in expand_chunks(R + "/takes/{subject}/{take}/" + pattern, take.subject, take.take)
     ]
 
@@ -116,7 +116,7 @@ rule lip_shapes:
         correspondence=[f"{R}/subjects/{name}/correspondence.npz" for name in trained_subjects()],
         accurate=of_training_chunks("multiview/H/{chunk}.npy"),
         accurate_quality=of_training_chunks("multiview/quality/{chunk}.tsv"),
-        neutrals=of_takes(R + "/takes/{subject}/{take}/multiview/neutral.npz", training_takes()),
+        neutrals=of_takes(R + "/takes/{subject}/{take}/multiview/neutral.npz", takes_that_train()),
     output:
         shapes=R + "/evaluation/lip_shapes.npz",
     log:
@@ -136,7 +136,7 @@ rule lip_shapes:
                 "train": take.train_frames(),
                 "chunks": len(chunks(take.subject, take.take)),
             }
-            for take in training_takes()
+            for take in takes_that_train()
         ],
     script:
         "../scripts/evaluation_lip_shapes.py"
