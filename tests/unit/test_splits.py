@@ -10,7 +10,12 @@ from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
-from vermilion.evaluation.regressors import regressors_of, regressors_of_study, with_variants
+from vermilion.evaluation.regressors import (
+    regressors_of,
+    regressors_of_study,
+    trained_on,
+    with_variants,
+)
 from vermilion.regression.training import Selection, train, training_subjects
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])
@@ -111,7 +116,9 @@ def test_a_person_is_judged_by_what_was_trained_and_by_nothing_twice(people, dat
     for subject in people:
         names = regressors_of(subject, trained)
         assert set(names) <= set(study)
-        rows = [frozenset(set(training_subjects(name, people)) & trained) for name in names]
+        rows = [frozenset(trained_on(name, sorted(trained))) for name in names]
+        for name, row in zip(names, rows, strict=True):
+            assert row == set(training_subjects(name, people)) & trained  # as training itself does
         if len(trained) > 1:  # with one person who trains, PS and MS are the same
             assert len(set(rows)) == len(rows)
         if subject not in trained:

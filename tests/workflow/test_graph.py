@@ -70,6 +70,12 @@ def test_every_rule_has_log_resources_and_fingerprint(path):
             assert "benchmark:" in body, f"{path.name}: {name}"
 
 
+def test_no_function_of_a_rule_file_replaces_another():
+    """All rule files share one namespace: the later of two functions of a name serves both."""
+    found = [name for path in RULES for name in re.findall(r"^def (\w+)\(", path.read_text(), re.M)]
+    assert sorted(found) == sorted(set(found))
+
+
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
 def test_a_script_is_run_by_one_rule_with_its_own_fingerprint(path):
     text = "".join(rule.read_text() for rule in RULES)

@@ -14,7 +14,12 @@ from snakemake.settings.types import ExecMode
 from vermilion.config.load import load_configuration
 from vermilion.config.takes import STUDIO, Take
 from vermilion.errors import ConfigurationError
-from vermilion.evaluation.regressors import regressors_of, regressors_of_study, with_variants
+from vermilion.evaluation.regressors import (
+    regressors_of,
+    regressors_of_study,
+    trained_on,
+    with_variants,
+)
 from vermilion.workflow import checksums
 from vermilion.workflow.cache import roles_of, wildcards_of
 from vermilion.workflow.fingerprint import fingerprint

@@ -66,6 +66,28 @@ def measured_against(take):
     return "truth" if has_truth(take) else "held-out H"
 
 
+def regressor_rows():
+    """What the report says each regressor was trained on and is judged by."""
+    rows = []
+    for name in regressor_names():
+        people = trained_on(name, trained_subjects())
+        training = [take for take in takes_that_train() if take.subject in people]
+        judged = [
+            take.name
+            for take in evaluated_takes()
+            if name in regressors_of(take.subject, trained_subjects())
+        ]
+        rows.append(
+            {
+                "regressor": name,
+                "trained_on": ", ".join(take.name for take in training),
+                "frames": sum(len(take.train_frames()) for take in training),
+                "judged_on": ", ".join(judged),
+            }
+        )
+    return rows
+
+
 rule quality:
     """Joins the flagged frames of every stage: quality.tsv."""
     input:
@@ -96,10 +118,20 @@ rule summary:
         measures=R + "/evaluation/measures.tsv",
         table1=R + "/evaluation/table1.tsv",
         kinds=R + "/evaluation/kinds.tsv",
+        comparisons=R + "/evaluation/comparisons.tsv",
+        table2=R + "/evaluation/table2.tsv",
+        table3=R + "/evaluation/table3.tsv",
+        estimators=R + "/evaluation/estimators.tsv",
         picture=R + "/evaluation/table1.png",
+        figure16=R + "/evaluation/figure16.png",
         quality=R + "/quality.tsv",
         maps=of_takes(EVALUATED + "/error_maps.png", evaluated_takes()),
+        renders=of_takes(EVALUATED + "/renders.png", evaluated_takes()),
+        stretch=of_takes(EVALUATED + "/stretch.png", evaluated_takes()),
         curves=of_takes(EVALUATED + "/curves.png", evaluated_takes()),
+        reconstructions=of_takes(
+            R + "/takes/{subject}/{take}/multiview/report.html", used_takes("tattoo")
+        ),
         training=[f"{R}/models/{name}.cv.png" for name in regressor_names()],
         overlays=[path for _, _, path in stage_overlays()],
         videos=[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
@@ -123,6 +155,9 @@ rule summary:
             "evaluation.figures.embed_video_mb",
             "evaluation.measures",
             "evaluation.reference",
+            "evaluation.contour",
+            "evaluation.variants",
+            "studio.seed",
             "correspondence",
             "correction.integration",
             "training",
@@ -133,12 +168,16 @@ rule summary:
             "training": regressor_names(),
             "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
             "videos": applied_takes(),
+            "reconstructions": [take.name for take in used_takes("tattoo")],
         },
+        regressors=regressor_rows(),
         frames=[
             {
                 "take": take.name,
                 "role": take.role,
                 "frames": len(take.frames),
+                "split": take.split,
+                "train": len(take.train_frames()) if take.role == "tattoo" else 0,
                 "held_out": len(take.test_frames()),
                 "against": measured_against(take),
             }

@@ -17,7 +17,7 @@ from vermilion.evaluation.lip_shapes import LipShapes
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import reference_of
-from vermilion.evaluation.take import evaluate_take
+from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_errors
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
 from vermilion.quality import QualityRow, write_quality
@@ -131,8 +131,9 @@ def main(snakemake):
     )  # fmt: skip
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
+    against = reference(snakemake, tracker, correspondence, frames)
     result = evaluate_take(
-        sequences, frames, tracker, regions, reference(snakemake, tracker, correspondence, frames),
+        sequences, frames, tracker, regions, against,
         options.clip_frames, options.min_clips, options.touch_mm, options.gape_mm,
         true_curves(snakemake, frames),
     )  # fmt: skip
@@ -148,8 +149,12 @@ def main(snakemake):
             contours["inner_px"],
             result.clips,
         )
-    for name, of_model in regressed.items():
-        sums[name] += held_out.sums_of_regressor(of_model, take, true, result.clips)
+    layer_errors = {
+        name: held_out.layer_errors(of_model, take, true) for name, of_model in regressed.items()
+    }
+    if true is not None:
+        for name, errors in layer_errors.items():
+            sums[name] += sums_of_layers(errors, result.clips)
     save_sums(out.sums, sums, len(frames))
     table = measure_rows(
         sums, *place.values(), len(frames),
@@ -162,10 +167,13 @@ def main(snakemake):
     write_table(
         out.seconds, [{**place, "regressor": n, "seconds_per_frame": s} for n, s in seconds.items()]
     )
-    write_table(out.frames, result.table)
+    write_table(out.frames, with_layer_errors(result.table, layer_errors))
     mouth = regions.weights["mouth"] > 0
     count = cfg["evaluation.figures.map_frames"]
-    maps = held_out.error_map_arrays(result, frames, count, tracker.triangles, mouth)
+    maps = held_out.shown_arrays(
+        result, take, frames, count, against, correspondence.coarse_neutral_mm, mouth, tracker,
+        fit.camera,
+    )  # fmt: skip
     save_arrays(out.maps, maps)
     reasons = ["" if ok else "not tracked, so not measured" for ok in tracked]
     rows = [QualityRow(int(f), not why, why) for f, why in zip(asked, reasons, strict=True)]

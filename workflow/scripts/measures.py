@@ -3,7 +3,9 @@
 import pandas as pd
 
 from vermilion.config.evaluation import MeasuresConfig
-from vermilion.evaluation.figures import bars
+from vermilion.evaluation.comparisons import comparisons, questions_of, rbf_and_affine
+from vermilion.evaluation.feature_tables import estimators, table2, table3
+from vermilion.evaluation.figures import bars, figure16
 from vermilion.evaluation.files import load_sums
 from vermilion.evaluation.kind_errors import kind_rows
 from vermilion.evaluation.measures import COLUMNS, seconds_rows
@@ -32,6 +34,18 @@ def main(snakemake):
     write_table(snakemake.output.kinds, kind_rows(takes, *pooled))
     summary = table1(measures)
     write_table(snakemake.output.table1, summary)
+    configured = snakemake.params.cfg["training.regressor"]
+    curves = [read_table(path) for path in snakemake.input.curves]
+    write_table(snakemake.output.comparisons, comparisons(takes, questions_of(configured), *pooled))
+    write_table(snakemake.output.table2, table2(curves))
+    write_table(snakemake.output.table3, table3(summary))
+    write_table(snakemake.output.estimators, estimators(curves, summary, configured))
+    tables = [read_table(path) for path in snakemake.input.frames]
+    figure16(
+        dict(zip([take["take"] for take in snakemake.params.takes], tables, strict=True)),
+        rbf_and_affine(configured),
+        snakemake.output.figure16,
+    )
     bars(summary, snakemake.output.picture)
     print(summary.to_string())
 

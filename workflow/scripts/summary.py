@@ -1,10 +1,17 @@
 """Every result on one HTML page that opens offline."""
 
+import os
 from pathlib import Path
 
 import pandas as pd
 
-from vermilion.evaluation.summary import FRAME_COLUMNS, Findings, Overlay, summary_page
+from vermilion.evaluation.summary import (
+    FRAME_COLUMNS,
+    REGRESSOR_COLUMNS,
+    Findings,
+    Overlay,
+    summary_page,
+)
 from vermilion.files import atomic_path
 from vermilion.logfile import log_to
 from vermilion.tables import read_table
@@ -33,7 +40,19 @@ def main(snakemake):
         table1=read_table(inputs.table1),
         kinds=read_table(inputs.kinds),
         flagged=read_table(inputs.quality),
+        comparisons=read_table(inputs.comparisons),
+        table2=read_table(inputs.table2),
+        table3=read_table(inputs.table3),
+        estimators=read_table(inputs.estimators),
+        configured=cfg["training"]["regressor"],
         table1_picture=Path(inputs.picture),
+        figure16=Path(inputs.figure16),
+        renders=named("maps", inputs.renders),
+        stretch=named("maps", inputs.stretch),
+        reconstructions=[
+            (name, os.path.relpath(path, Path(snakemake.output.page).parent))
+            for name, path in zip(names["reconstructions"], inputs.reconstructions, strict=True)
+        ],
         error_maps=named("maps", inputs.maps),
         over_time=named("maps", inputs.curves),
         curve_pictures=named("training", inputs.training),
@@ -41,6 +60,7 @@ def main(snakemake):
         videos=named("videos", inputs.videos),
         timelines=named("videos", inputs.timelines),
         frames=pd.DataFrame(snakemake.params.frames, columns=list(FRAME_COLUMNS)),
+        regressors=pd.DataFrame(snakemake.params.regressors, columns=list(REGRESSOR_COLUMNS)),
         settings=settings(cfg),
     )
     with atomic_path(snakemake.output.page) as temporary:

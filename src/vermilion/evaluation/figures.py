@@ -1,18 +1,14 @@
-"""Pictures of the report: error maps, curves over time, table 1."""
+"""Plots of the report: curves over time, table 1, RBF network against affine map."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pandas as pd
 
-from vermilion.camera import Camera, look_at, pinhole
-from vermilion.draw import colour_map
 from vermilion.evaluation.table1 import in_order, kind_of, place_of
-from vermilion.export.shading import shade
 from vermilion.plot import new_figure, plain, save, with_gaps
 
 COLOURS = {
@@ -20,7 +16,6 @@ COLOURS = {
     "MS": "#2a6f97", "GR": "#4f8a3c", "H": "#7b5ea7",
 }  # fmt: skip
 _INK = "#222222"
-_GREY = (0.72, 0.72, 0.72)
 
 
 def colour_of(regressor: str) -> str:
@@ -37,79 +32,6 @@ def map_frames(error_mm: np.ndarray, count: int) -> np.ndarray:
     stretches = np.array_split(np.arange(len(error_mm)), min(count, len(error_mm)))
     filled = np.nan_to_num(error_mm)
     return np.array([part[np.argmax(filled[part])] for part in stretches if len(part)])
-
-
-def error_maps(
-    meshes_mm: dict[str, np.ndarray],
-    errors_mm: dict[str, np.ndarray],
-    triangles: np.ndarray,
-    mouth: np.ndarray,
-    frames: Sequence[int],
-    scale_mm: float,
-    size_px: int,
-) -> np.ndarray:
-    """Meshes coloured by their error, a row a frame and view, a column a regressor.
-
-    Args:
-        meshes_mm: regressor -> (n, V, 3) in the head frame (y up, z out of the face).
-        errors_mm: regressor -> (n, V); NaN, drawn grey, where not measured.
-        triangles: (T, 3) to draw.
-        mouth: (V,) bool, what the views are centred on.
-        frames: numbers of the n frames, for the labels.
-        scale_mm: error of the hottest colour.
-
-    Returns:
-        (h, w, 3) uint8, with a colour bar below.
-    """
-    names = in_order(meshes_mm)
-    rows = []
-    for index, frame in enumerate(frames):
-        centre = np.nanmean(meshes_mm[names[0]][index][mouth], axis=0)
-        extent = np.ptp(meshes_mm[names[0]][index][mouth], axis=0)[:2].max()
-        for view, direction in (("front", (0.0, 0.0, 1.0)), ("side", (1.0, 0.0, 0.12))):
-            camera = view_of(centre, np.array(direction), 1.35 * extent, size_px)
-            pictures = []
-            for name in names:
-                colours = colour_map(errors_mm[name][index], 0.0, scale_mm)
-                colours[np.isnan(errors_mm[name][index])] = _GREY
-                paper = np.full((camera.height_px, camera.width_px, 3), 255, np.uint8)
-                mesh = np.asarray(meshes_mm[name][index], dtype=float)
-                picture = shade(paper, camera, mesh, triangles, colours, 1.0)
-                text = f"{name}, frame {frame}" if view == "front" else ""
-                pictures.append(caption(picture, text))
-            rows.append(np.hstack(pictures))
-    picture = np.vstack(rows)
-    return np.vstack([picture, colour_bar(picture.shape[1], scale_mm)])
-
-
-def view_of(centre_mm: np.ndarray, direction: np.ndarray, width_mm: float, size_px: int) -> Camera:
-    """A long lens that looks at `centre_mm` from `direction`, `width_mm` wide there, nearly square."""
-    far = 1500.0
-    pose = look_at(centre_mm + far * direction / np.linalg.norm(direction), centre_mm, (0, 1, 0))
-    return pinhole("view", far * size_px / width_mm, size_px, size_px, pose)
-
-
-def caption(picture: np.ndarray, text: str) -> np.ndarray:
-    """Dark text on the white paper of (h, w, 3) uint8."""
-    if text:
-        picture = np.ascontiguousarray(picture)
-        cv2.putText(
-            picture, text, (8, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA
-        )
-    return picture
-
-
-def colour_bar(width_px: int, scale_mm: float) -> np.ndarray:
-    """(46, width, 3) uint8: the colours of 0 to `scale_mm`."""
-    bar = np.full((46, width_px, 3), 255, dtype=np.uint8)
-    left, length = 12, min(360, width_px - 90)
-    ramp = colour_map(np.linspace(0, 1, length), 0, 1)
-    bar[8:22, left : left + length] = np.rint(255 * ramp)
-    for share in (0.0, 0.5, 1.0):
-        text = f"{share * scale_mm:g}" + (" mm and over" if share == 1 else "")
-        place = (left + round(share * length) - (0 if share == 0 else 8), 38)
-        cv2.putText(bar, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, (30, 30, 30), 1, cv2.LINE_AA)
-    return bar
 
 
 def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
@@ -150,7 +72,12 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
 
 
 def bars(table: pd.DataFrame, out: str | Path) -> None:
-    """Table 1 as a picture: mean error of each regressor with its interval, a group a take."""
+    """Table 1 as a picture: mean error of each regressor with its interval, a group a take.
+
+    Variants are shown of all takes together alone.
+    """
+    whole = (table["subject"] == "all") & (table["take"] == "all")
+    table = table[whole | ~table["regressor"].str.contains("/")]
     groups = list(table.groupby(["subject", "take"], sort=False))
     figure = new_figure(8.6, 0.9 + 0.26 * (len(table) + 1.5 * len(groups)))
     axis = figure.subplots()
@@ -178,4 +105,56 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
     axis.set_xlabel("mean vertex error over the mouth mask, mm (line: interval over clips)")
     plain(axis)
     axis.grid(False)
+    save(figure, out)
+
+
+def figure16(
+    takes: dict[str, pd.DataFrame], pairs: Sequence[tuple[str, str]], out: str | Path
+) -> None:
+    """Lips16 figure 16 as PNG: two regressors' error over the mouth, and in feature space, over time.
+
+    Args:
+        takes: `subject/take` -> columns frame, regressor, mouth_mm, feature_error.
+        pairs: kinds of regressors (RBF network, affine map) in order of preference: of each take the
+            first pair that it has is drawn.
+    """
+    panels = (("mouth_mm", "mouth, mm"), ("feature_error", "feature space"))
+    figure = new_figure(8.6, 4.6)
+    axes = figure.subplots(2, 1, sharex=True)
+    colours, start, drawn = ("#2a6f97", "#c8553d"), 0, set()
+    for name, table in takes.items():
+        kinds = table["regressor"].map(kind_of)
+        pair = next((p for p in pairs if set(p) <= set(kinds)), None)
+        if pair is None:
+            continue
+        frames = table.loc[kinds == pair[0], "frame"].to_numpy()
+        place = start + np.arange(len(frames))
+        for axis, (column, _) in zip(axes, panels, strict=True):
+            for regressor, colour, text in zip(
+                pair, colours, ("RBF network", "affine map"), strict=True
+            ):
+                values = table.loc[kinds == regressor, column].to_numpy(dtype=float)
+                label = text if text not in drawn and np.isfinite(values).any() else None
+                drawn |= {text} if label else set()
+                axis.plot(place, values, color=colour, lw=1.3, label=label)
+        axes[0].text(place[0], 1.0, f" {name}, {pair[0].split('/')[0]}", fontsize=7, va="bottom",
+                     color=_INK, transform=axes[0].get_xaxis_transform())  # fmt: skip
+        for axis in axes:
+            axis.axvline(place[-1] + 1, color="#d0cbc5", lw=0.8)
+        start = place[-1] + 3
+    for axis, (_, text) in zip(axes, panels, strict=True):
+        axis.set_ylabel(text)
+        plain(axis)
+        axis.set_ylim(bottom=0)
+    if not drawn:
+        axes[0].text(0.5, 0.5, "evaluation.variants lacks `rbf` or `affine`", ha="center",
+                     transform=axes[0].transAxes, color=_INK)  # fmt: skip
+    axes[-1].set_xlabel(
+        "held-out frames, take after take; the layers are known of tattoo takes alone"
+    )
+    handles, labels = axes[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=2, frameon=False, fontsize=8
+        )
     save(figure, out)

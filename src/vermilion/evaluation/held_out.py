@@ -8,14 +8,15 @@ import numpy as np
 
 from vermilion.camera import Camera
 from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation.alignment import moved
 from vermilion.evaluation.closest import SurfacePoints
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
 from vermilion.evaluation.figures import map_frames
 from vermilion.evaluation.masks import lip_labels
-from vermilion.evaluation.reference import truth_of_vertices
-from vermilion.evaluation.take import TakeResult, sums_of_layers
+from vermilion.evaluation.reference import Reference, truth_of_vertices
+from vermilion.evaluation.take import TakeResult
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import triangle_areas
 from vermilion.regression.model import LipModel
@@ -101,38 +102,72 @@ def sums_of_contours(
     return sums_of_frames("mouth.contour", distance, clips)
 
 
-def sums_of_regressor(
-    regressed: Regressed, take: CoarseTake, true: TrueLayers | None, clips: np.ndarray
-) -> ClipSums:
-    """Sums behind `feature_error`; none where the true layers are not known."""
+def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers | None) -> np.ndarray:
+    """RMS of regressed against true layer entries, weighted by area, (F,); NaN where one is unknown.
+
+    Lips16's error in feature space.
+    """
+    errors = np.full(len(take.features), np.nan)
     if true is None:
-        return ClipSums()
+        return errors
     common, ours, theirs = np.intersect1d(regressed.model.mask, true.mask, return_indices=True)
     known = np.isfinite(take.features).all(axis=1) & true.valid
-    predicted = np.full((len(clips), len(common), 9), np.nan)
     if known.any():
-        predicted[known] = regressed.model.predict(take.features[known], take.neutral_mm)[:, ours]
-    areas = triangle_areas(take.neutral_mm, take.triangles[common])
-    return sums_of_layers(predicted, true.layers[:, theirs], areas, clips)
+        predicted = regressed.model.predict(take.features[known], take.neutral_mm)[:, ours]
+        square = ((predicted - true.layers[known][:, theirs]) ** 2).mean(axis=2)
+        areas = triangle_areas(take.neutral_mm, take.triangles[common])
+        errors[known] = np.sqrt(square @ areas / areas.sum())
+    return errors
 
 
-def error_map_arrays(
-    result: TakeResult, frames: np.ndarray, count: int, triangles: np.ndarray, mouth: np.ndarray
+def shown_arrays(
+    result: TakeResult,
+    take: CoarseTake,
+    frames: np.ndarray,
+    count: int,
+    reference: Reference,
+    neutral_mm: np.ndarray,
+    mouth: np.ndarray,
+    tracker: FaceModel,
+    camera: Camera,
 ) -> dict[str, np.ndarray]:
-    """Meshes in the head frame and errors of the `count` frames that the report shows.
+    """What the sheets of renders need, of the `count` frames that the report shows; no variants.
+
+    Args:
+        neutral_mm: (V, 3) of the base track.
+        mouth: (V,) bool, the mouth mask.
 
     Returns:
-        frames (n,), regressors (R,), meshes_mm (R, n, V, 3), errors_mm (R, n, V), triangles, mouth.
+        frames (n,), regressors (R,), meshes_mm (R, n, V, 3) in the head frame, errors_mm (R, n, V),
+        neutrals_mm (R, V, 3), points_mm (n, V, 3) where they belong, rest_mm (V, 3) of the neutral,
+        surface_mm (n, S, 3) and surface_triangles of the reference, triangles, mouth, vermilion,
+        centre_px (n, 2) of the lips and px_per_mm (n,) in the picture.
     """
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = map_frames(base, count)
-    turn = result.head[0][chosen].transpose(0, 2, 1)
-    names = list(result.aligned_mm)
-    return {
+    rotations, translations = (part[chosen] for part in result.head)
+    names = [name for name in result.aligned_mm if "/" not in name]
+    of_truth = {"base": neutral_mm, "contour": neutral_mm}
+    used = np.unique(reference.triangles)
+    lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]
+    local = camera.to_camera(take.coarse_mm[chosen][:, lips].mean(axis=1))
+    arrays = {
+        "meshes_mm": np.stack(
+            [moved(result.aligned_mm[n][chosen], rotations, translations) for n in names]
+        ),
+        "errors_mm": np.stack([result.errors_mm[n][chosen] for n in names]),
+        "neutrals_mm": np.stack([of_truth.get(n, reference.rest_mm) for n in names]),
+        "points_mm": moved(reference.points_mm[chosen], rotations, translations),
+        "rest_mm": reference.rest_mm,
+        "surface_mm": moved(reference.vertices_mm[chosen][:, used], rotations, translations),
+    }
+    return {name: values.astype(np.float32) for name, values in arrays.items()} | {
         "frames": frames[chosen],
         "regressors": np.array(names),
-        "meshes_mm": np.stack([result.aligned_mm[n][chosen] @ turn for n in names], dtype=np.float32, casting="same_kind"),
-        "errors_mm": np.stack([result.errors_mm[n][chosen] for n in names], dtype=np.float32, casting="same_kind"),
-        "triangles": triangles,
+        "surface_triangles": np.searchsorted(used, reference.triangles),
+        "triangles": tracker.triangles,
         "mouth": mouth,
-    }  # fmt: skip
+        "vermilion": lips,
+        "centre_px": camera.project(take.coarse_mm[chosen][:, lips].mean(axis=1)),
+        "px_per_mm": camera.calibration[0, 0] / local[:, 2],
+    }

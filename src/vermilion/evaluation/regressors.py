@@ -25,6 +25,12 @@ def regressors_of(subject: str, trained: Collection[str]) -> list[str]:
     return [*own, f"GR-{subject}"] if set(trained) - {subject} else own
 
 
+def trained_on(name: str, trained: Sequence[str]) -> list[str]:
+    """Whose frames a regressor of `regressors_of_study` trains on."""
+    kind, _, subject = name.partition("-")
+    return [s for s in trained if kind == "MS" or (s == subject) == (kind == "PS")]
+
+
 def with_variants(
     names: Sequence[str], variants: Sequence[str], kinds: Collection[str]
 ) -> list[str]:

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from vermilion import page
-from vermilion.evaluation.mouth_kinds import KINDS
+from vermilion.evaluation import study
+from vermilion.evaluation.how_measured import how_measured
 from vermilion.evaluation.table1 import in_order, place_of
 
-FRAME_COLUMNS = ("take", "role", "frames", "held_out", "against")
+FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
+REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
 _STAGES = (
     "capture", "multiview", "inpaint", "landmarks", "tracking", "contours", "features",
     "correspondence", "correction", "evaluation", "apply",
@@ -35,11 +36,13 @@ class Findings:
 
     Attributes:
         measures, table1, kinds, flagged: tables.
-        table1_picture: file.
-        error_maps, over_time, curve_pictures: (name, file) pairs.
+        comparisons, table2, table3, estimators: tables; configured: the estimator of the configuration.
+        table1_picture, figure16: files.
+        renders, stretch, error_maps, over_time, curve_pictures: (name, file) pairs.
+        reconstructions: (name, link) pairs, pages on H of a take.
         overlays: pictures of the stages.
         videos, timelines: (name, file) pairs of the corrected takes.
-        frames: a row a take: take, role, frames, held_out, against.
+        frames, regressors: tables of `how_measured`.
         settings: (what, value) pairs for "How this was measured".
     """
 
@@ -47,14 +50,24 @@ class Findings:
     table1: pd.DataFrame
     kinds: pd.DataFrame
     flagged: pd.DataFrame
+    comparisons: pd.DataFrame
+    table2: pd.DataFrame
+    table3: pd.DataFrame
+    estimators: pd.DataFrame
+    configured: str
     table1_picture: Path
+    figure16: Path
+    renders: Sequence[tuple[str, Path]]
+    stretch: Sequence[tuple[str, Path]]
     error_maps: Sequence[tuple[str, Path]]
     over_time: Sequence[tuple[str, Path]]
     curve_pictures: Sequence[tuple[str, Path]]
     overlays: Sequence[Overlay]
     videos: Sequence[tuple[str, Path]]
     timelines: Sequence[tuple[str, Path]]
+    reconstructions: Sequence[tuple[str, str]]
     frames: pd.DataFrame
+    regressors: pd.DataFrame
     settings: Sequence[tuple[str, str]]
 
 
@@ -67,17 +80,24 @@ def summary_page(found: Findings, embed_video_mb: float) -> str:
         f"{takes} takes, {total} frames. Everything on this page is also a TSV file beside it.",
         [
             ("Key figures", _key_figures(found)),
+            ("What the comparisons say", study.answers(
+                found.comparisons, found.estimators, found.table1, found.configured)),
             ("Table 1: tracking error", _table1(found)),
+            ("Tables 2 and 3: influence of the features", study.features(found.table2, found.table3)),
+            ("RBF network, affine map, kernel regression", study.strategies(found.estimators)
+             + page.picture(found.figure16, _FIGURE16_CAPTION)),
             ("Corrected takes", _videos(found, embed_video_mb)),
-            ("Error maps", "".join(page.picture(p, _MAP_CAPTION.format(n)) for n, p in found.error_maps)),
-            ("Over time", "".join(page.picture(p, f"{n}: held-out frames.") for n, p in found.over_time)),
-            ("Kinds of mouth shapes", _kinds(found.kinds)),
+            ("Renders", _pictures(found.renders, _RENDER_CAPTION)),
+            ("Surface stretch", _pictures(found.stretch, _STRETCH_CAPTION)),
+            ("Error maps", _pictures(found.error_maps, _MAP_CAPTION)),
+            ("Over time", _pictures(found.over_time, "{}: held-out frames.")),
+            ("Kinds of mouth shapes", study.kinds(found.kinds)),
             ("Further measures", _further(found.measures)),
-            ("Accuracy of H", _reconstruction(found.measures)),
-            ("Training", "".join(page.picture(p, f"{n}: cross-validation error.") for n, p in found.curve_pictures)),
+            ("Accuracy of H", _reconstruction(found)),
+            ("Training", _pictures(found.curve_pictures, "{}: cross-validation error.")),
             ("Flagged frames", _flagged(found)),
             ("Pictures of every stage", _stages(found.overlays)),
-            ("How this was measured", _how(found)),
+            ("How this was measured", how_measured(found.frames, found.regressors, found.settings)),
         ],
     )  # fmt: skip
 
@@ -86,16 +106,28 @@ _TIMELINE_CAPTION = (
     "{}: how far each frame lies from what the regressor was trained on, and the limit over which it "
     "is listed below as outside the training's span; grey frames were not corrected."
 )
+_RENDER_CAPTION = (
+    "{}: held-out frames with the largest error of the base track, from front and side: the picture, "
+    "every regressor, the truth (Lips16 figures 10, 12, 13)."
+)
+_STRETCH_CAPTION = (
+    "{}: surface stretch of the same frames, each against its own neutral: red is stretched, blue "
+    "compressed (Lips16 figures 9 and 11)."
+)
+_FIGURE16_CAPTION = (
+    "Lips16 figure 16: RBF network and affine map over time, each with its best parameters. Above, mean "
+    "vertex error over the mouth mask; below, error of the layers where they are known."
+)
 _MAP_CAPTION = (
     "{}: distance of each vertex to its corresponding point, held-out frames with the largest error "
-    "of the base track; grey is not measured."
+    "of the base track; grey is not measured (Lips16 figures 14 and 15)."
 )
 
 
 def _key_figures(found: Findings) -> str:
     items = []
     rows = _together(found.table1).set_index("regressor")
-    for name in in_order(rows.index):
+    for name in in_order(name for name in rows.index if "/" not in name):
         row = rows.loc[name]
         if name == "base":
             items.append((f"{row['mean_mm']:.2f} mm", "base track, mean error over the mouth"))
@@ -125,26 +157,11 @@ def _table1(found: Findings) -> str:
         "over clips. Lips16 reports 4.0 mm for its base tracker and 3.3, 3.0 and 3.2 mm for PS, MS "
         "and GR on its own data."
     )
-    return page.table(rows, headings, "where") + page.picture(found.table1_picture, caption)
-
-
-def _kinds(kinds: pd.DataFrame) -> str:
-    rows = kinds[(kinds["region"] == "mouth")].reset_index(drop=True)
-    if rows.empty:
-        return ""
-    headings = {
-        "kind": "kind", "regressor": "regressor", "mean_mm": "mean, mm", "low_mm": "low",
-        "high_mm": "high", "ratio_to_base": "of base", "ratio_low": "low", "ratio_high": "high",
-        "frames": "frames", "clips": "clips",
-    }  # fmt: skip
-    order = rows["kind"].map({kind: k for k, kind in enumerate(KINDS)})
-    rows = rows.iloc[np.argsort(order, kind="stable")]
-    rows = rows[~rows["regressor"].str.contains("/")]
-    note = (
-        "<p>Mean vertex error over the mouth mask by kind of mouth shape, all takes together. The vermilion "
-        "alone, and variants, are in <code>kinds.tsv</code>.</p>"
-    )
-    return note + page.table(rows, headings, "kind")
+    own = rows[~rows["regressor"].str.contains("/")]
+    tables = page.table(own, headings, "where")
+    if len(own) < len(rows):
+        tables += page.folded("With all variants", page.table(rows, headings, "where"))
+    return tables + page.picture(found.table1_picture, caption)
 
 
 def _further(measures: pd.DataFrame) -> str:
@@ -158,20 +175,36 @@ def _further(measures: pd.DataFrame) -> str:
     wide = wide[in_order(wide.columns)].reset_index()
     headings = {"region": "region", "measure": "measure", "unit": "unit"}
     headings |= {name: name for name in in_order(rows["regressor"])}
-    note = "<p>All takes together; each take by itself is in <code>measures.tsv</code>.</p>"
+    closed = "" if (rows["measure"] == "false_open_rate").any() else _NEVER_CLOSED
+    note = (
+        closed + "<p>All takes together; each take by itself is in <code>measures.tsv</code>.</p>"
+    )
     return note + page.table(wide, headings, "region")
 
 
-def _reconstruction(measures: pd.DataFrame) -> str:
-    rows = measures[measures["regressor"] == "H"]
+_NEVER_CLOSED = (
+    "<p>No held-out frame has lips that touch in truth, so that there is no false_open_rate.</p>"
+)
+
+
+def _pictures(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
+    return "".join(page.picture(path, caption.format(name)) for name, path in pairs)
+
+
+def _reconstruction(found: Findings) -> str:
+    links = ", ".join(
+        f'<a href="{page.text(link)}">{page.text(name)}</a>' for name, link in found.reconstructions
+    )
+    links = f"<p>How each take was reconstructed, page by page: {links}.</p>" if links else ""
+    rows = found.measures[found.measures["regressor"] == "H"]
     if rows.empty:
-        return '<p class="none">No tattoo take has known truth to hold H against.</p>'
+        return links + '<p class="none">No tattoo take has known truth to hold H against.</p>'
     rows = rows.assign(where=rows["subject"] + "/" + rows["take"])
     headings = {
         "where": "take", "region": "region", "measure": "measure", "value": "value",
         "low": "low", "high": "high", "unit": "unit", "frames": "frames",
     }  # fmt: skip
-    return (
+    return links + (
         "<p>The multi-view reconstruction itself against known truth, in the rig's world, without "
         "any alignment.</p>" + page.table(rows, headings, "where")
     )
@@ -214,43 +247,6 @@ def _stages(overlays: Sequence[Overlay]) -> str:
 
 def _rank(stage: str) -> tuple[int, str]:
     return (_STAGES.index(stage) if stage in _STAGES else len(_STAGES), stage)
-
-
-def _how(found: Findings) -> str:
-    frames = page.table(
-        found.frames,
-        {"take": "take", "role": "role", "frames": "frames", "held_out": "held out",
-         "against": "measured against"},
-    )  # fmt: skip
-    settings = pd.DataFrame(found.settings, columns=["what", "value"])
-    return _HOW + frames + page.table(settings, {"what": "setting", "value": "value"})
-
-
-_HOW = """
-<p><b>Frames.</b> Only frames that the take sheet holds out are measured; no regressor saw them, nor did
-the choice of its parameters. Frames that were not tracked are left out and listed above.</p>
-<p><b>Correspondence.</b> A vertex of the coarse mesh C belongs to a point of H (found once a person, on
-the neutral). Where truth is known, that point goes on to the nearest point of the truth's neutral that
-faces the same way and is not on the other lip, and is then followed through the truth's frames. Vertices
-without such a point are not measured. Where no truth is known, the held-out H takes its place.</p>
-<p><b>Alignment.</b> One rigid motion a frame, without scale, brings the base track onto the truth: area-
-weighted least squares over the face outside the mouth mask. All corrections of the frame share it, so
-that they differ from the base by their correction alone. H is measured without alignment.</p>
-<p><b>Regions.</b> <i>mouth</i>: the triangles of the correction layer; <i>vermilion</i>: the red of both
-lips; <i>face</i>: the face. The inside of the mouth is in none of them. Every mean, deviation and
-percentile is weighted by the area of the neutral.</p>
-<p><b>Measures.</b> Vertex error: distance to the corresponding point. Surface error: distance to the
-nearest point of the true surface. Gap: lowest point of the upper lip less highest point of the lower, in
-seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
-time, less that of the truth. Contour error: distance of contour points found in the picture to the
-projected contours of the mesh, per inter-ocular distance. Feature error: RMS of regressed against true
-layer entries.</p>
-<p><b>Kinds of mouth shapes.</b> By the true expression weights where they are known, each over a threshold
-(pucker or funnel, rolls, presses, jaw, smiles), else by width, gap, height of the red and protrusion of the
-reference's lips against its neutral; speech is what lies between.</p>
-<p><b>Intervals.</b> Percentile bootstrap over clips of consecutive frames; every regressor is measured on
-the same draws, so that ratios compare like with like. With one clip there is no interval.</p>
-"""
 
 
 def _together(rows: pd.DataFrame) -> pd.DataFrame:

@@ -151,22 +151,23 @@ def evaluate_reconstruction(
     return {"H": sums}
 
 
-def sums_of_layers(
-    regressed: np.ndarray, true: np.ndarray, areas: np.ndarray, clips: np.ndarray
-) -> ClipSums:
-    """Sums behind `feature_error`: RMS of regressed against true layer entries, weighted by area.
-
-    Args:
-        regressed, true: (F, T, 9); areas: (T,) of the mask's triangles.
-    """
-    square = ((regressed - true) ** 2).mean(axis=2) @ areas
-    known = np.isfinite(square)
+def sums_of_layers(errors: np.ndarray, clips: np.ndarray) -> ClipSums:
+    """Sums behind `feature_error`, of the RMS error of each frame's layer (F,); NaN does not count."""
+    known = np.isfinite(errors)
     return ClipSums(
         {
-            "mouth.feature_square": by_clip(np.where(known, square, 0.0), clips),
-            "mouth.feature_entries": by_clip(known * areas.sum(), clips),
+            "mouth.feature_square": by_clip(np.where(known, errors, 0.0) ** 2, clips),
+            "mouth.feature_entries": by_clip(known.astype(float), clips),
         }
     )
+
+
+def with_layer_errors(table: pd.DataFrame, errors: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """The table of `TakeResult` with a column `feature_error`: of each regressor (F,), else NaN."""
+    column = np.full(len(table), np.nan)
+    for name, of_frames in errors.items():
+        column[(table["regressor"] == name).to_numpy()] = of_frames
+    return table.assign(feature_error=column)
 
 
 def _frame_rows(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
-from tests.stages.evaluation.conftest import CFG, SUBJECT
+from tests.stages.evaluation.conftest import CFG, MODELS, SUBJECT
 from tests.stages.evaluation.test_measures import reconstruction, values
+from tests.stages.lip_scene import CHUNKS, TEST
 from tests.stages.run_script import run_script
 from vermilion.draw import to_display
 from vermilion.images import write_srgb8
@@ -15,46 +17,110 @@ from vermilion.tables import read_table
 pytestmark = pytest.mark.slow
 
 
-def test_tables_figures_and_page(scene):
+#: Tables and figures of all takes together, file names by output.
+TOGETHER = {
+    "measures": "measures.tsv", "kinds": "kinds.tsv", "table1": "table1.tsv", "table2": "table2.tsv",
+    "table3": "table3.tsv", "comparisons": "comparisons.tsv", "estimators": "estimators.tsv",
+    "picture": "table1.png", "figure16": "figure16.png",
+}  # fmt: skip
+#: Pictures of a take.
+SHEETS = {
+    "maps": "error_maps.png", "renders": "renders.png", "stretch": "stretch.png",
+    "curves": "curves.png",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def tables(scene):
+    """The evaluation folder with all tables and pictures but the page."""
     root, out = scene.root, reconstruction(scene)
     ev = root / "evaluation"
     run_script(
         "measures",
-        params={"cfg": CFG, "takes": [{"take": "ana/rom", "role": "tattoo"}]},
+        params={
+            "cfg": CFG | {"training.regressor": "kernel"},
+            "takes": [{"take": "ana/rom", "role": "tattoo"}],
+        },
         input={
             "takes": [ev / "truth/sums.npz"],
             "seconds": [ev / "truth/seconds.tsv"],
+            "frames": [ev / "truth/frames.tsv"],
+            "curves": [root / f"models/{name}.cv.tsv" for name in MODELS],
             "reconstructions": [out / "sums.npz"],
             "tables": [ev / "truth/measures.tsv", out / "measures.tsv"],
         },
-        output={
-            "measures": ev / "measures.tsv",
-            "kinds": ev / "kinds.tsv",
-            "table1": ev / "table1.tsv",
-            "picture": ev / "table1.png",
-        },
+        output={name: ev / file for name, file in TOGETHER.items()},
     )
-    table = read_table(ev / "table1.tsv")
-    together = table[table["subject"] == "all"].set_index("regressor")["mean_mm"]
-    assert together["PS"] == pytest.approx(values(root, "truth")["PS-ana"], abs=1e-6)
     run_script(
         "evaluation_figures",
         wildcards={"subject": SUBJECT, "take": "rom"},
-        params={"cfg": CFG},
+        params={
+            "cfg": CFG,
+            "source": [str(root / f"takes/{SUBJECT}/rom/inpaint/{CHUNKS[0]}")],
+            "camera": "face2",
+        },
         input={"maps": ev / "truth/maps.npz", "frames": ev / "truth/frames.tsv"},
-        output={"maps": ev / "error_maps.png", "curves": ev / "curves.png"},
+        output={name: ev / file for name, file in SHEETS.items()},
     )
+    return ev
+
+
+def test_rows_of_all_takes_are_those_of_the_only_take(scene, tables):
+    table = read_table(tables / "table1.tsv")
+    together = table[table["subject"] == "all"].set_index("regressor")["mean_mm"]
+    assert together["PS"] == pytest.approx(values(scene.root, "truth")["PS-ana"], abs=1e-6)
+    kinds = read_table(tables / "kinds.tsv")
+    base = kinds[(kinds["regressor"] == "base") & (kinds["region"] == "mouth")]
+    assert base["frames"].sum() == len(TEST)
+    assert np.average(base["mean_mm"], weights=base["frames"]) == pytest.approx(
+        together["base"], rel=0.01
+    )
+
+
+def test_every_comparison_of_section_6_is_there(tables):
+    rows = read_table(tables / "comparisons.tsv")
+    pairs = set(zip(rows["first"], rows["second"], strict=True))
+    assert {
+        ("MS/rbf", "MS/affine"), ("MS", "MS/shape-only"), ("MS", "MS/distances-only"),
+        ("MS", "MS/rbf"), ("GR", "contour"), ("PS", "base"),
+    } <= pairs  # fmt: skip
+    assert set(rows["measure"]) == {"vertex_error_mean_mm", "feature_error"}
+    features = read_table(tables / "table2.tsv")
+    assert set(features.loc[features["regressor"] == "MS", "features"]) == {
+        "shape coefficients", "contour distances", "combined",
+    }  # fmt: skip
+    tracking = read_table(tables / "table3.tsv").set_index("features")["mean_mm"]
+    table = read_table(tables / "table1.tsv").set_index(["subject", "regressor"])["mean_mm"]
+    assert tracking["combined"] == table["all", "MS"]
+    assert set(read_table(tables / "estimators.tsv")["estimator"]) == {"rbf", "affine", "kernel"}
+
+
+def test_sheets_have_a_column_a_mesh(tables):
+    size = CFG["evaluation.figures"]["map_size_px"]
+    columns = {"maps": 6, "renders": 8, "stretch": 7}  # base, contour, oracle, PS, MS, GR; truth
+    for name, count in columns.items():
+        picture = cv2.imread(str(tables / SHEETS[name]))
+        assert picture.shape[1] == count * size, name
+        assert picture.shape[0] // size == 4
+
+
+def test_page_is_whole_and_needs_no_network(scene, tables):
+    root = scene.root
     run_script(
         "quality",
-        input={"tables": [ev / "truth/quality.tsv"]},
+        input={"tables": [tables / "truth/quality.tsv"]},
         output={"flagged": root / "quality.tsv"},
     )
-    write_page(root, ev)
-    page = (ev / "summary.html").read_text(encoding="utf-8")
-    assert "not tracked, so not measured" in page
-    assert "PS-ana" in page
+    write_page(root, tables)
+    page = (tables / "summary.html").read_text(encoding="utf-8")
+    for text in (
+        "not tracked, so not measured", "PS-ana", "RBF network against affine map",
+        "Table 2: cross-validation error", "Table 3: tracking error", "trained on",
+        'href="../takes/ana/rom/multiview/report.html"',
+    ):  # fmt: skip
+        assert text in page, text
     assert 'src="http' not in page
-    assert page.count("data:image/") >= 4
+    assert page.count("data:image/") >= 8
 
 
 def write_page(root, ev):
@@ -63,32 +129,44 @@ def write_page(root, ev):
     run_script(
         "summary",
         params={
-            "cfg": {"evaluation.figures.embed_video_mb": 1.0, "evaluation.measures": {"seed": 0}},
+            "cfg": {
+                "evaluation.figures.embed_video_mb": 1.0,
+                "evaluation.measures": {"seed": 0},
+                "training": {"regressor": "kernel"},
+            },
+            "regressors": [
+                {
+                    "regressor": "MS",
+                    "trained_on": "ana/rom, bo/rom",
+                    "frames": 60,
+                    "judged_on": "ana/rom",
+                }
+            ],
             "names": {
                 "maps": ["ana/rom"],
                 "training": ["MS"],
                 "overlays": [["tracking", "ana/rom"]],
                 "videos": [],
                 "timelines": [],
+                "reconstructions": ["ana/rom"],
             },
             "frames": [
                 {
                     "take": "ana/rom",
                     "role": "tattoo",
                     "frames": 40,
+                    "split": "test:30-39",
+                    "train": 30,
                     "held_out": 11,
                     "against": "truth",
                 }
             ],
         },
         input={
-            "measures": ev / "measures.tsv",
-            "kinds": ev / "kinds.tsv",
-            "table1": ev / "table1.tsv",
-            "picture": ev / "table1.png",
+            **{name: ev / file for name, file in TOGETHER.items()},
             "quality": root / "quality.tsv",
-            "maps": [ev / "error_maps.png"],
-            "curves": [ev / "curves.png"],
+            **{name: [ev / file] for name, file in SHEETS.items()},
+            "reconstructions": [root / "takes/ana/rom/multiview/report.html"],
             "training": [root / "models/MS.cv.png"],
             "overlays": [overlay],
             "videos": [],

@@ -1,0 +1,103 @@
+"""What the comparisons say, in sentences: nothing in them is written beforehand but the grammar."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+_TRACKING, _LAYERS = "vertex_error_mean_mm", "feature_error"
+
+
+def statements(
+    comparisons: pd.DataFrame, estimators: pd.DataFrame, table1: pd.DataFrame, configured: str
+) -> list[tuple[str, list[str]]]:
+    """(question, sentences) of every question that was answered, one sentence a kind of regressor.
+
+    Args:
+        comparisons, estimators, table1: tables of those modules.
+        configured: the estimator of the configuration.
+    """
+    found = []
+    for question, rows in comparisons.groupby("question", sort=False):
+        tracking = rows[rows["measure"] == _TRACKING]
+        sentences = [sentence(row) for row in tracking.to_dict("records")]
+        sentences += [
+            reason
+            for row in tracking.to_dict("records")
+            if row["answer"] != "better"
+            and (reason := why(row, comparisons, estimators, table1, configured))
+        ]
+        found.append((str(question), sentences))
+    return found
+
+
+def sentence(row: dict) -> str:
+    """One comparison of the tracking error in words."""
+    change = 100 * (1 - row["ratio"])
+    figures = (
+        f"{row['first']} {row['first_value']:.2f} mm, {row['second']} {row['second_value']:.2f} mm, "
+        f"{abs(change):.0f} % {'less' if change >= 0 else 'more'}"
+    )
+    if row["answer"] == "unknown":
+        return f"{figures}; one clip, so no interval."
+    interval = (
+        f"difference {row['difference']:+.2f} mm, interval {row['low']:+.2f} to {row['high']:+.2f} "
+        f"over {row['clips']} clips"
+    )
+    verdict = {
+        "better": "better, and the interval leaves out 0",
+        "worse": "worse, and the interval leaves out 0",
+        "level": "not shown to differ: the interval holds 0",
+    }[row["answer"]]
+    return f"{figures} ({interval}): {verdict}."
+
+
+def why(
+    row: dict,
+    comparisons: pd.DataFrame,
+    estimators: pd.DataFrame,
+    table1: pd.DataFrame,
+    configured: str,
+) -> str:
+    """What the other figures say of a difference in tracking that is not an advantage; may be empty.
+
+    The layers may not differ either (features and layers are bound nearly linearly, as blend shapes
+    are); they may differ while what the integration and the rigid alignment leave hides it; or the
+    training may favour what the held-out frames do not.
+    """
+    kind = row["first"].split("/")[0]
+    parts = []
+    layers = comparisons[
+        (comparisons["measure"] == _LAYERS)
+        & (comparisons["first"] == row["first"])
+        & (comparisons["second"] == row["second"])
+    ]
+    if len(layers):
+        change = 100 * (1 - float(layers["ratio"].iloc[0]))
+        word = {
+            "better": "better",
+            "worse": "worse",
+            "level": "level",
+            "unknown": "without interval",
+        }
+        parts.append(
+            f"in the layers themselves its error on held-out frames is {abs(change):.0f} % "
+            f"{'less' if change >= 0 else 'more'} ({word[layers['answer'].iloc[0]]})"
+        )
+    pair = estimators[estimators["regressor"] == kind].set_index("estimator")["feature_error"]
+    names = [row[side].partition("/")[2] or configured for side in ("first", "second")]
+    if all(name in pair.index for name in names):
+        change = 100 * (1 - pair[names[0]] / pair[names[1]])
+        parts.append(
+            f"in cross-validation {abs(change):.0f} % {'less' if change >= 0 else 'more'}"
+            + (", so that a linear map explains nearly all that can be told from these features"
+               if "affine" in names and abs(change) < 5 else "")
+        )  # fmt: skip
+    floor = table1[
+        (table1["subject"] == "all") & (table1["take"] == "all") & (table1["regressor"] == "oracle")
+    ]
+    if len(floor) and np.isfinite(floor["mean_mm"].iloc[0]):
+        parts.append(
+            f"the true layers themselves leave {floor['mean_mm'].iloc[0]:.2f} mm, the floor of the method"
+        )
+    return f"Why, for {kind}: " + "; ".join(parts) + "." if parts else ""
