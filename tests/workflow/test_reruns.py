@@ -18,7 +18,7 @@ AFTER_TRAINING = {
 AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
 AFTER_CONTOURS = AFTER_FEATURES | {"features"}
 AFTER_TRACKING = AFTER_CONTOURS | {
-    "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
+    "appearance", "photometric", "photometric_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
     "landmarks", "identity", "tracking", "tracking_topology", "contour_detector", "contours",
@@ -112,6 +112,18 @@ def test_comment_in_a_library_module(finished):
     path = finished.folder / "src" / "vermilion" / "mesh.py"
     with changed(path, path.read_bytes() + b"\n# a comment\n"):
         assert finished.would_run() == {}
+
+
+def test_overlay_of_the_refinement(finished):
+    with configured(finished, lambda content: content.update(refinement={"overlay_frames": 2})):
+        assert set(finished.would_run()) == {"residuals", "ablations", "summary"}
+
+
+def test_refinement_switched_off(finished):
+    with configured(finished, lambda content: content.update(refinement={"photometric": False})):
+        jobs = set(finished.would_run())
+    assert {"tracking", "tracking_meshes"} <= jobs
+    assert not jobs & {"appearance", "photometric", "photometric_join", "residuals", "ablations"}
 
 
 def test_line_of_code_in_the_tracking_module(finished):

@@ -53,6 +53,11 @@ def stage_overlays():
             pattern = R + "/takes/{subject}/{take}/" + folder + "/overlay/{chunk}.png"
             path = expand_chunks(pattern, take.subject, take.take)[0]
             rows.append([folder.split("/")[-1], take.name, path])
+    for take in used_takes(("tattoo", "video")) if refinement_steps() else []:
+        folder = f"{R}/takes/{take.name}/tracking"
+        chunk = chunks(take.subject, take.take)[0]
+        rows.append(["refinement", f"{take.name}, appearance", f"{folder}/appearance.png"])
+        rows.append(["refinement", take.name, f"{folder}/residuals/overlay/{chunk}.png"])
     for take in used_takes(("tattoo", "plain")):
         path = f"{R}/takes/{take.name}/multiview/overlay/neutral.png"
         rows.append(["multiview", f"{take.name}, neutral", path])

@@ -95,6 +95,7 @@ def all_outputs():
             for name in applied_takes()
             for path in expand_chunks(APPLIED + "/chunks/{chunk}.npy", *name.split("/"))
         ],
+        *([R + "/evaluation/ablations.tsv"] if refinement_steps() else []),
         R + "/quality.tsv",
         R + "/evaluation/summary.html",
     ]

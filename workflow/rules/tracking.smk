@@ -67,15 +67,28 @@ rule identity:
         "../scripts/identity.py"
 
 
+def landmark_fit(wildcards=None):
+    """Where the fit to the landmarks lies: beside the refined one, or in its place."""
+    name = "landmark_fit" if CONFIG.refinement.photometric else "fit"
+    return R + f"/takes/{{subject}}/{{take}}/tracking/{name}.npz"
+
+
+def mesh_offsets(wildcards):
+    """Input of the meshes: offsets of a chunk that a refinement adds to the model's vertices."""
+    if not CONFIG.refinement.layer:
+        return {}
+    return {"offsets": R + "/takes/{subject}/{take}/tracking/offsets/{chunk}.npy"}
+
+
 rule tracking:
-    """Fits pose and blend weights of a whole take to its landmarks: tracking/fit.npz."""
+    """Fits pose and blend weights of a whole take to its landmarks."""
     input:
         tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         cameras=R + "/takes/{subject}/{take}/cameras",
     output:
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        fit=landmark_fit(),
     log:
         R + "/logs/tracking/{subject}-{take}.log",
     benchmark:
@@ -96,6 +109,7 @@ rule tracking_meshes:
     """Writes C of a chunk in the world, and the model over the pictures: tracking/C/{chunk}.npy."""
     input:
         unpack(mono_inputs),
+        unpack(mesh_offsets),
         tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",

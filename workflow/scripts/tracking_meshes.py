@@ -6,7 +6,7 @@ from vermilion.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.quality import write_quality
-from vermilion.sequences import write_sequence
+from vermilion.sequences import read_sequence, write_sequence
 from vermilion.tracking.judge import quality_rows
 from vermilion.tracking.overlay import tracking_overlay
 from vermilion.tracking.result import Identity, TrackedTake
@@ -17,7 +17,8 @@ def main(snakemake):
     inputs, frames = snakemake.input, snakemake.params.frames
     tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
     rows = fit.index_of(frames)
-    vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows)
+    offsets = read_sequence(inputs.offsets) if inputs.get("offsets") else None
+    vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows, offsets)
     picture = tracking_overlay(
         open_frames(snakemake.params.source, subject, take),
         fit.camera,

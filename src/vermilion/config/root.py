@@ -17,6 +17,7 @@ from vermilion.config.features import FeaturesConfig
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.landmarks import LandmarksConfig
 from vermilion.config.multiview import MultiviewConfig
+from vermilion.config.refinement import RefinementConfig
 from vermilion.config.studio import StudioConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.config.training import TrainingConfig
@@ -59,6 +60,10 @@ class Configuration(StageConfig):
     )
     tracking: TrackingConfig = Field(
         default_factory=TrackingConfig, description="The coarse monocular track (Lips16 3.2)."
+    )
+    refinement: RefinementConfig = Field(
+        default_factory=RefinementConfig,
+        description="Dense refinement of the track by its pictures (Lips16 3.2).",
     )
     contours: ContoursConfig = Field(
         default_factory=ContoursConfig, description="Lip contour likelihood maps (Lips16 3.2.2)."

@@ -16,7 +16,7 @@ from vermilion.evaluation.table1 import in_order, place_of
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
 REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
 _STAGES = (
-    "capture", "multiview", "inpaint", "landmarks", "tracking", "contours", "features",
+    "capture", "multiview", "inpaint", "landmarks", "tracking", "refinement", "contours", "features",
     "correspondence", "correction", "evaluation", "apply",
 )  # fmt: skip
 

@@ -142,9 +142,20 @@ class TrackedTake:
         rows = {int(frame): row for row, frame in enumerate(self.frames)}
         return np.array([rows[int(frame)] for frame in frames], dtype=np.int64)
 
-    def vertices_mm(self, model: FaceModel, identity: Identity, rows: np.ndarray) -> np.ndarray:
-        """Meshes of some rows in the world, (len(rows), V, 3)."""
+    def vertices_mm(
+        self,
+        model: FaceModel,
+        identity: Identity,
+        rows: np.ndarray,
+        offsets_mm: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Meshes of some rows in the world, (len(rows), V, 3).
+
+        `offsets_mm` (len(rows), V, 3) in the head frame are added to the model's vertices.
+        """
         local = model.vertices(identity.identity, self.weights[rows])
+        if offsets_mm is not None:
+            local = local + offsets_mm
         turned = local @ np.swapaxes(self.world_from_head_rotation[rows], 1, 2)
         return turned + self.world_from_head_translation_mm[rows, None]
 

@@ -1,0 +1,33 @@
+"""Which frames of a take its appearance is learnt from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: A turn of this many radians is as much of a change as a blend weight from 0 to 1.
+_TURN = 0.35
+
+
+def choose_frames(x: np.ndarray, valid: np.ndarray, error_px: np.ndarray, count: int) -> np.ndarray:
+    """Rows of well-fitted frames that differ most in pose and expression, sorted.
+
+    The best-fitted frame first, then always the frame farthest from those chosen. Frames whose
+    landmarks fit worse than those of three quarters of the take are left out.
+
+    Args:
+        x: (F, 6 + K) rotation vector, translation, weights.
+        valid: (F,) bool.
+        error_px: (F,) reprojection error; NaN where there are no landmarks.
+        count: rows wanted; fewer where the take has fewer.
+    """
+    usable = np.flatnonzero(valid & np.isfinite(error_px))
+    if len(usable) == 0:
+        return usable
+    good = usable[error_px[usable] <= np.quantile(error_px[usable], 0.75)]
+    place = np.concatenate([x[good, :3] / _TURN, x[good, 6:]], axis=1)
+    chosen = [int(np.argmin(error_px[good]))]
+    distance = np.linalg.norm(place - place[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(good)):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(place - place[chosen[-1]], axis=1))
+    return np.sort(good[chosen])

@@ -1,0 +1,38 @@
+"""Light on a matt surface as nine spherical harmonics of its normal (Ramamoorthi, Hanrahan 2001)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+N_HARMONICS = 9
+
+
+def harmonics(normals: np.ndarray) -> np.ndarray:
+    """Harmonics (..., 9) of unit normals (..., 3): 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
+
+    Unscaled: the coefficients of the light absorb the constants.
+    """
+    x, y, z = np.moveaxis(normals, -1, 0)
+    terms = [np.ones_like(x), y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y]
+    return np.stack(terms, axis=-1)
+
+
+def harmonics_jacobian(normals: np.ndarray) -> np.ndarray:
+    """Derivative (..., 9, 3) of `harmonics` by the normal."""
+    x, y, z = np.moveaxis(normals, -1, 0)
+    o, i = np.zeros_like(x), np.ones_like(x)
+    rows = [
+        [o, o, o], [o, i, o], [o, o, i], [i, o, o], [y, x, o], [o, z, y],
+        [o, o, 6 * z], [z, o, x], [2 * x, -2 * y, o],
+    ]  # fmt: skip
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def irradiance(normals: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Light (..., 3) RGB on a white surface with `normals` (..., 3); never quite dark.
+
+    Args:
+        light: (9, 3) coefficients.
+    """
+    floor = 0.02 * np.abs(light[0])
+    return np.maximum(harmonics(normals) @ light, floor)

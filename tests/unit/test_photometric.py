@@ -1,0 +1,209 @@
+"""Dense refinement on pictures of a painted dome, whose pose, expression and light are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.unit.photometric_scene import LIGHT, dome, mesh_of, motion, picture_of, take_start
+from vermilion.photometric.ablations import ablation_rows
+from vermilion.photometric.appearance import Sightings, estimate_appearance
+from vermilion.photometric.choose import choose_frames
+from vermilion.photometric.display import display_slope, to_display_values
+from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.photometric.harmonics import harmonics, harmonics_jacobian, irradiance
+from vermilion.photometric.join import join_frames
+from vermilion.photometric.layer import CorrectiveLayer, LayerSettings
+from vermilion.photometric.residual import photometric_residual, sample_errors
+from vermilion.photometric.samples import SurfaceSamples, sample_skin
+from vermilion.photometric.surface import SampledFace
+from vermilion.photometric.take import learn_appearance, refine_frames
+from vermilion.tracking.pose import rotation_of
+from vermilion.tracking.settings import FitSettings
+
+MODEL = dome()
+N_FRAMES = 6
+SETTINGS = PhotometricSettings(iterations=(4, 4, 6))
+
+
+def unit_vectors(count, seed=1):
+    vectors = np.random.default_rng(seed).normal(size=(count, 3))
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def test_harmonics_jacobian_is_their_derivative():
+    normals, step = unit_vectors(20), 1e-6
+    for axis in range(3):
+        moved = normals + step * np.eye(3)[axis]
+        slope = (harmonics(moved) - harmonics(normals)) / step
+        assert np.abs(slope - harmonics_jacobian(normals)[..., axis]).max() < 1e-4
+
+
+def test_display_slope_is_the_curves_derivative():
+    light = np.linspace(0.01, 0.9, 50)
+    slope = (to_display_values(light + 1e-7) - to_display_values(light)) / 1e-7
+    assert np.abs(slope / display_slope(light) - 1).max() < 1e-3
+
+
+def test_samples_cover_the_skin_evenly_and_leave_its_border_out():
+    samples = sample_skin(MODEL, 1.0)
+    at = samples.matrix(MODEL.triangles, MODEL.n_vertices)
+    points = at @ MODEL.neutral_mm
+    assert np.allclose(at @ np.ones(MODEL.n_vertices), 1.0)
+    assert np.abs(points[:, :2]).max() < 60 - 5.0  # mm: two rings of 3 mm lie along the border
+    assert len(samples) == pytest.approx(108**2 * 1.24, rel=0.05)
+
+
+def test_light_and_albedo_are_told_apart_by_the_skin_that_has_one_colour():
+    rng = np.random.default_rng(2)
+    frames, count = 6, 600
+    normals = np.stack([unit_vectors(count, seed) for seed in range(frames)])
+    normals[..., 2] = -np.abs(normals[..., 2])
+    albedo = np.tile([0.5, 0.35, 0.3], (count, 1)) * (1 + 0.05 * rng.normal(size=(count, 1)))
+    albedo[:60] = [0.5, 0.1, 0.1]  # lips
+    colours = (albedo * irradiance(normals, LIGHT))[:, None]
+    samples = SurfaceSamples(np.zeros(count, dtype=np.int32), np.full((count, 3), 1 / 3))
+    seen = Sightings(colours, normals, np.ones((frames, count)))
+    found = estimate_appearance(np.arange(frames), samples, seen, 0.5)
+    ratio = irradiance(normals, found.light) / irradiance(normals, LIGHT)
+    assert np.abs(ratio / ratio.mean(axis=(0, 1)) - 1).mean() < 0.02
+    reddish = found.albedo[0][:60] / found.albedo[0][60:].mean(axis=0)
+    assert reddish[:, 0].mean() == pytest.approx(1.0, abs=0.08)
+    assert reddish[:, 1].mean() == pytest.approx(0.1 / 0.35, abs=0.12)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Truth, a start that is off, and an appearance learnt from true poses of other frames."""
+    truth = motion(2 * N_FRAMES)
+    start = take_start(MODEL, truth, truth)
+    samples = sample_skin(MODEL, 2.5)
+    face = start.face(samples)
+    rows = range(N_FRAMES, 2 * N_FRAMES)
+    views = [
+        start.view(row, picture_of(MODEL, mesh_of(MODEL, truth[row])), face, 1.0, 3) for row in rows
+    ]
+    appearance = learn_appearance(np.array(rows), views, face, samples, 0.2, 0, lambda found: None)
+    rng = np.random.default_rng(5)
+    off = truth[:N_FRAMES].copy()
+    off[:, :3] += rng.normal(0, 0.01, (N_FRAMES, 3))
+    off[:, 3:5] += rng.normal(0, 0.8, (N_FRAMES, 2))
+    off[:, 6:] = np.clip(off[:, 6:] + rng.normal(0, 0.15, (N_FRAMES, 3)), 0, 1)
+    return truth[:N_FRAMES], off, samples, appearance
+
+
+def in_pixels(x):
+    return np.stack([1200.0 * v[:, :2] / v[:, 2:] for v in (mesh_of(MODEL, row) for row in x)])
+
+
+def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
+    truth, off, samples, appearance = scene
+    start = take_start(MODEL, truth, off)
+    face = start.face(samples)
+    pictures = [picture_of(MODEL, mesh_of(MODEL, row)) for row in truth]
+    problem = FrameProblem(face, appearance, SETTINGS, 0.5)
+    found = refine_frames(
+        start, np.ones(N_FRAMES, dtype=bool), lambda row: pictures[row], problem, 1.0
+    )
+    refined = take_positions(start, found["x"])
+    before = np.linalg.norm(in_pixels(off) - in_pixels(truth), axis=2).mean()
+    after = np.linalg.norm(refined - in_pixels(truth), axis=2).mean()
+    assert before > 1.5  # px, at 2.4 px/mm
+    assert after < 0.25
+    assert found["refined"].all()
+    for row, picture in enumerate(pictures):
+        view = start.view(row, picture, face, 1.0, 1)
+        residual = [
+            photometric_residual(*sample_errors(view, x, face, appearance)[:2])
+            for x in (start.x[row], found["x"][row])
+        ]
+        assert residual[1] < 0.5 * residual[0]
+
+
+def take_positions(start, x):
+    return np.stack([1200.0 * v[:, :2] / v[:, 2:] for v in (start.vertices(row) for row in x)])
+
+
+def test_frames_that_are_not_tracked_keep_the_landmark_fit(scene):
+    truth, off, samples, appearance = scene
+    start = take_start(MODEL, truth, off)
+    problem = FrameProblem(start.face(samples), appearance, SETTINGS, 0.5)
+    none = np.zeros(N_FRAMES, dtype=bool)
+    found = refine_frames(start, none, lambda row: None, problem, 1.0)
+    assert np.array_equal(found["x"], start.x) and not found["refined"].any()
+
+
+def test_normals_change_with_the_weights_as_the_meshs_do():
+    samples = sample_skin(MODEL, 5.0)
+    face = SampledFace.of(MODEL, MODEL.neutral_mm, samples)
+    weights, step = np.array([0.3, 0.5, 0.2]), 1e-4
+    rows = np.random.default_rng(0).normal(size=(len(samples), 1, 3))
+    slope = face.through_normals(weights, rows)
+    for k in range(3):
+        more = weights + step * np.eye(3)[k]
+        change = ((face.normals(more) - face.normals(weights)) * rows[:, 0]).sum(axis=1) / step
+        assert np.abs(change - slope[:, 0, k]).max() < 1e-3
+
+
+def test_layer_follows_what_the_model_cannot_make(scene):
+    truth, _, samples, appearance = scene
+    near = np.exp(-((MODEL.neutral_mm[:, :2] - [5, 5]) ** 2).sum(axis=1) / (2 * 15.0**2))
+    bulge = near[:, None] * np.array([2.0, -1.0, 0.0])
+    start = take_start(MODEL, truth, truth)
+    face = start.face(samples)
+    picture = picture_of(MODEL, mesh_of(MODEL, truth[0], bulge))
+    view = start.view(0, picture, face, 1.0, 3)
+    layer = CorrectiveLayer(MODEL, MODEL.neutral_mm, face, appearance, LayerSettings())
+    found = layer.solve(view)
+    missed = np.linalg.norm(found - bulge, axis=1)
+    assert near @ missed < 0.3 * near @ np.linalg.norm(bulge, axis=1)
+    in_camera = found @ (rotation_of(view.start[:3]) @ view.reference).T
+    assert np.abs(in_camera[:, 2]).max() < 1e-9
+    still = layer.solve(start.view(0, picture_of(MODEL, mesh_of(MODEL, truth[0])), face, 1.0, 3))
+    assert np.linalg.norm(still, axis=1).mean() < 0.15  # mm
+
+
+def test_joined_frames_keep_steady_motion_and_lose_noise():
+    n, p = 60, 9
+    rng = np.random.default_rng(1)
+    steady = np.linspace(0.2, 0.8, n)[:, None] * np.ones(p)
+    noisy = steady + 0.02 * rng.normal(size=(n, p))
+    matrices = np.tile(np.eye(p) * 4.0, (n, 1, 1))
+    everything = np.ones(n, dtype=bool)
+    settings = FitSettings()
+    same = join_frames(matrices, 4.0 * steady, steady, everything, 30.0, settings)
+    assert np.abs(same - steady).max() < 1e-9
+    smooth = join_frames(matrices, 4.0 * noisy, noisy, everything, 30.0, settings)
+    assert np.abs(smooth - steady)[:, 6:].mean() < 0.6 * np.abs(noisy - steady)[:, 6:].mean()
+    backwards = join_frames(matrices, 4.0 * noisy[::-1], noisy[::-1], everything, 30.0, settings)
+    assert np.abs(backwards[::-1] - smooth).max() < 1e-6
+    holes = everything.copy()
+    holes[10] = False
+    assert np.allclose(
+        join_frames(matrices, 4.0 * noisy, noisy, holes, 30.0, settings)[10], noisy[10]
+    )
+
+
+def test_chosen_frames_are_well_fitted_and_differ():
+    x = np.zeros((20, 8))
+    x[:, 6] = np.linspace(0, 1, 20)
+    error, valid = np.full(20, 2.0), np.ones(20, dtype=bool)
+    error[19], valid[0], error[5] = 9.0, False, 1.0
+    chosen = choose_frames(x, valid, error, 4)
+    assert 5 in chosen and 18 in chosen and 19 not in chosen and 0 not in chosen
+    assert len(chosen) == 4
+    assert len(choose_frames(x, np.zeros(20, dtype=bool), error, 4)) == 0
+
+
+def test_ablations_tell_frames_that_taught_the_appearance_from_others():
+    table = pd.DataFrame(
+        {
+            "subject": "s", "take": "t", "step": ["landmarks"] * 3 + ["photometric"] * 3,
+            "frame": [0, 1, 2] * 2, "residual": [1.0, 3.0, np.nan, 0.5, 1.5, 2.5],
+            "learnt_from": [1, 0, 0] * 2,
+        }
+    )  # fmt: skip
+    rows = ablation_rows(table)
+    assert list(rows["step"]) == ["landmarks", "photometric"]
+    assert list(rows["residual"]) == [2.0, 1.5]
+    assert list(rows["held_out"]) == [3.0, 2.0]
+    assert list(rows["frames"]) == [2, 3]
