@@ -34,6 +34,22 @@ def apply_exports():
     return outputs
 
 
+def chunks_around(pattern):
+    """Input function: `pattern` for the chunks with a frame that the wildcards' chunk depends on."""
+
+    def files(wildcards):
+        frames, reach = frames_in(wildcards.chunk), CONFIG.correction.picture.reach_frames
+        near = [
+            chunk
+            for chunk in chunks(wildcards.subject, wildcards.take)
+            if frames_in(chunk)[0] <= frames[-1] + reach
+            and frames_in(chunk)[-1] >= frames[0] - reach
+        ]
+        return [pattern.format(**{**dict(wildcards), "chunk": chunk}) for chunk in near]
+
+    return files
+
+
 def applied_takes():
     """Takes to be corrected, `subject/take`: those named, or all of role `video`."""
     rows = takes("video")
@@ -49,8 +65,8 @@ rule apply:
         tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
-        features=R + "/takes/{subject}/{take}/correction/features/{chunk}.npz",
+        coarse=chunks_around(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
+        features=chunks_around(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
         model=apply_model,
     output:
         corrected=APPLIED + "/chunks/{chunk}.npy",
@@ -64,7 +80,7 @@ rule apply:
         mem_mb=1500,
         runtime=60,
     params:
-        cfg=cfg_of("apply.overlay", "correction.integration"),
+        cfg=cfg_of("apply.overlay", "correction.integration", "correction.picture"),
         code=code_of("apply"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
         fps=lambda wildcards: take_of(wildcards).fps,

@@ -70,6 +70,7 @@ rule evaluate:
             "evaluation.contour",
             "evaluation.figures.map_frames",
             "correction.integration",
+            "correction.picture",
         ),
         code=code_of("evaluate"),
         frames=lambda wildcards: take_of(wildcards).test_frames(),

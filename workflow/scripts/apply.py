@@ -3,9 +3,16 @@
 import numpy as np
 
 from vermilion.config.apply import OverlayConfig
+from vermilion.config.correction import PictureConfig
 from vermilion.correction.apply import correct_sequence
+from vermilion.correction.picture import (
+    PICTURE_ARRAYS,
+    Picture,
+    PictureSettings,
+    frames_around,
+)
 from vermilion.draw import to_display
-from vermilion.evaluation.files import read_chunks
+from vermilion.evaluation.files import read_chunks, read_frames
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
 from vermilion.frames import open_frames
@@ -13,7 +20,7 @@ from vermilion.logfile import log_to
 from vermilion.progress import progress
 from vermilion.quality import QualityRow, write_quality
 from vermilion.regression.model import load_model
-from vermilion.sequences import read_sequence, write_sequence
+from vermilion.sequences import frames_of, write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.video import write_video
 
@@ -34,16 +41,25 @@ def main(snakemake):
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
     tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
     identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
-    rows = fit.index_of(frames)
-    given = read_chunks([inputs.features], frames, ["features", "valid"])
+    settings = PictureConfig(**params.cfg["correction.picture"])
+    near = frames_around(frames, frames_of(inputs.coarse), settings.reach_frames)
+    given = read_chunks(inputs.features, near, ["features", *PICTURE_ARRAYS])
     features = np.where(given["valid"][:, None], given["features"], np.nan)
-    has_features, tracked = np.isfinite(features).all(axis=1), fit.valid[rows]
-    coarse = np.asarray(read_sequence(inputs.coarse), dtype=np.float64)
-    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
+    coarse = np.asarray(read_frames(inputs.coarse, near), dtype=np.float64)
+    pose, rows = (
+        (fit.world_from_head_rotation, fit.world_from_head_translation_mm),
+        fit.index_of(near),
+    )
+    picture = Picture.of(
+        tracker, fit.camera, near, given, PictureSettings(**params.cfg["correction.picture"])
+    )
     corrected = correct_sequence(
         model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
-        features, valid=tracked, **params.cfg["correction.integration"],
+        features, valid=fit.valid[rows], **params.cfg["correction.integration"], picture=picture,
     )  # fmt: skip
+    asked = np.searchsorted(near, frames)
+    coarse, corrected, features, rows = (a[asked] for a in (coarse, corrected, features, rows))
+    has_features, tracked = np.isfinite(features).all(axis=1), fit.valid[rows]
     # The picture shows what the file holds: beyond its precision, sums differ from run to run.
     corrected = corrected.astype(np.float32).astype(np.float64)
     write_sequence(out.corrected, corrected)

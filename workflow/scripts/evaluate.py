@@ -5,8 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.config.correction import IntegrationConfig
+from vermilion.config.correction import PictureConfig
 from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
+from vermilion.correction.picture import (
+    PICTURE_ARRAYS,
+    Picture,
+    PictureSettings,
+    frames_around,
+)
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.errors import InputError
 from vermilion.evaluation import held_out
@@ -74,10 +80,11 @@ def true_curves(snakemake, frames):
     return [curves[frame - snakemake.params.first] for frame in frames]
 
 
-def coarse_take(inputs, tracker, fit, frames, integration):
-    """The coarse track at the frames, with its features."""
+def coarse_take(inputs, tracker, fit, frames, cfg):
+    """The coarse track at the frames, with its features and what was found in the picture."""
     rows = fit.index_of(frames)
-    features = read_chunks(inputs.features, frames, ["features", "valid"])
+    features = read_chunks(inputs.features, frames, ["features", *PICTURE_ARRAYS])
+    settings = PictureSettings(**cfg["correction.picture"])
     return CoarseTake(
         np.asarray(read_frames(inputs.coarse, frames), dtype=np.float64),
         tracker.triangles,
@@ -85,7 +92,8 @@ def coarse_take(inputs, tracker, fit, frames, integration):
         fit.world_from_head_rotation[rows],
         fit.world_from_head_translation_mm[rows],
         np.where(features["valid"][:, None], features["features"], np.nan),
-        **integration.model_dump(),
+        **cfg["correction.integration"],
+        picture=Picture.of(tracker, fit.camera, frames, features, settings),
     )
 
 
@@ -111,19 +119,26 @@ def main(snakemake):
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    take = coarse_take(
-        inputs, tracker, fit, frames, IntegrationConfig(**cfg["correction.integration"])
+    reach = PictureConfig(**cfg["correction.picture"]).reach_frames
+    near = frames_around(frames, fit.frames, reach)  # what the result of a frame depends on
+    around, asked_of_near = (
+        coarse_take(inputs, tracker, fit, near, cfg),
+        np.searchsorted(near, frames),
     )
+    take = around[asked_of_near]
 
     sequences, true = {"base": take.coarse_mm}, None
     if inputs.get("layers"):
-        layers = read_chunks(inputs.layers, frames, ["layers", "displacement_mm", "valid"])
-        sequences["oracle"] = corrected_by_truth(correspondence.mask, take=take, **layers)
+        layers = read_chunks(inputs.layers, near, ["layers", "displacement_mm", "valid"])
+        oracle = corrected_by_truth(correspondence.mask, take=around, **layers)
+        sequences["oracle"] = oracle[asked_of_near]
+        layers = {name: values[asked_of_near] for name, values in layers.items()}
         true = held_out.TrueLayers(correspondence.mask, layers["layers"], layers["valid"])
-    regressed = {
-        measure_name(Path(path).stem): held_out.Regressed.of(load_model(path), take)
-        for path in inputs.models
-    }
+    regressed = {}
+    for path in inputs.models:
+        name = measure_name(Path(path).stem)
+        of = around.as_in_paper() if name.endswith("/paper") else around
+        regressed[name] = held_out.Regressed.of(load_model(path), of, asked_of_near)
     contours = read_chunks(inputs.features, frames, CONTOURS)
     sequences["contour"] = contour_track(
         inputs, tracker, fit, take, correspondence, FoundContours(**contours),

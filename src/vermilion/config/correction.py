@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field
@@ -52,10 +53,47 @@ class IntegrationConfig(StageConfig):
     )
 
 
+class PictureConfig(StageConfig):
+    """How the corrected mesh is made to agree with the picture. None of it is in the paper."""
+
+    repose: bool = Field(
+        True,
+        description="Lay the corrected head on the picture again: rigidly, by its lip contours, brows "
+        "and eyes. Without, true lips beside a coarse face of other proportions miss the picture's.",
+    )
+    repose_frames: float = Field(
+        3.0,
+        ge=0.0,
+        le=30.0,
+        description="Deviation of the filter over time of that motion; symmetric, so without lag "
+        "(frames). 0: every frame for itself.",
+    )
+    contour_weight: float = Field(
+        1.0,
+        ge=0.0,
+        le=1000.0,
+        description="Weight of a millimetre of lip contour, as a constraint that it projects on the one "
+        "found in the picture, beside the stiffness of the mesh. 0: none.",
+    )
+    contact: bool = Field(
+        True,
+        description="Lips that touch in the picture meet in the mesh (by `contour_weight`), and never pass "
+        "through each other.",
+    )
+
+    @property
+    def reach_frames(self) -> int:
+        """Frames to either side that the result of a frame depends on."""
+        return math.ceil(3 * self.repose_frames) if self.repose else 0
+
+
 class CorrectionConfig(StageConfig):
     """The correction layer (Lips16 4.2)."""
 
     layers: LayersConfig = Field(default_factory=LayersConfig, description="Making layers.")
     integration: IntegrationConfig = Field(
         default_factory=IntegrationConfig, description="Applying layers."
+    )
+    picture: PictureConfig = Field(
+        default_factory=PictureConfig, description="Agreeing with the picture."
     )

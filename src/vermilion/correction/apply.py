@@ -14,7 +14,8 @@ those of the take. For known layers and displacements (the oracle):
                                     displacement_mm=displacement_mm, detail_mm=15.0)
 
 Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
-correct several stretches of one person, use one `Corrector`.
+correct several stretches of one person, use one `Corrector`. With a `picture` (`Picture`, of the same
+frames) the corrected heads are laid on it and their lips made to agree with it: see `picture_fit`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ import numpy as np
 
 from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.correction.integration import LayerIntegrator
+from vermilion.correction.picture import Picture
+from vermilion.correction.picture_fit import PictureFit
 from vermilion.regression.model import LipModel
 
 
@@ -66,6 +69,7 @@ def correct_sequence(
     valid: np.ndarray | None = None,
     seam_mm: float = 16.0,
     detail_mm: float = 0.0,
+    picture: Picture | None = None,
 ) -> np.ndarray:
     """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
 
@@ -76,11 +80,10 @@ def correct_sequence(
     if valid is not None:
         usable &= valid
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
-    corrected = np.array(coarse_mm, dtype=np.float64)
-    corrected[usable] = world_from_head(
-        corrector.correct(head, features[usable]), rotation[usable], translation_mm[usable]
-    )
-    return corrected
+    return _in_world(
+        corrector.integrator, corrector.correct(head, features[usable]), usable, coarse_mm,
+        neutral_mm, rotation, translation_mm, picture,
+    )  # fmt: skip
 
 
 def correct_with_layers(
@@ -96,6 +99,7 @@ def correct_with_layers(
     seam_mm: float = 16.0,
     displacement_mm: np.ndarray | None = None,
     detail_mm: float = 0.0,
+    picture: Picture | None = None,
 ) -> np.ndarray:
     """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,).
 
@@ -108,8 +112,28 @@ def correct_with_layers(
     integrator = LayerIntegrator(neutral_mm, triangles, mask, seam_mm, detail_mm)
     places = displacement_mm[usable] if detail_mm > 0 else None
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
+    return _in_world(
+        integrator, integrator.integrate(head, layers[usable], places), usable, coarse_mm,
+        neutral_mm, rotation, translation_mm, picture,
+    )  # fmt: skip
+
+
+def _in_world(
+    integrator: LayerIntegrator,
+    head: np.ndarray,
+    usable: np.ndarray,
+    coarse_mm: np.ndarray,
+    neutral_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    picture: Picture | None,
+) -> np.ndarray:
+    """The coarse meshes (F, V, 3), with the corrected ones (usable frames, V, 3) of the head frame."""
     corrected = np.array(coarse_mm, dtype=np.float64)
-    corrected[usable] = world_from_head(
-        integrator.integrate(head, layers[usable], places), rotation[usable], translation_mm[usable]
-    )
+    pose = rotation[usable], translation_mm[usable]
+    if picture is None or not picture.settings.used:
+        corrected[usable] = world_from_head(head, *pose)
+    else:
+        fit = PictureFit.of(integrator, neutral_mm, picture)
+        corrected[usable] = fit.fit(head, corrected[usable], *pose, picture[usable])
     return corrected

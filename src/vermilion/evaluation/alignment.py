@@ -12,8 +12,8 @@ def align_frames(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rotations (F, 3, 3) and translations (F, 3) from a sequence to its target, frame by frame.
 
-    Weighted least squares over the vertices with a positive weight. The correction moves none of
-    them, so the coarse track and every correction of it share one alignment.
+    Weighted least squares over the vertices with a positive weight. A correction moves them
+    little, but for the motion of the whole head.
 
     Args:
         sequence_mm: (F, V, 3), any world.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vermilion.correction.apply import Corrector, correct_with_layers
 from vermilion.correction.head import head_from_world, world_from_head
+from vermilion.correction.picture import Picture
+from vermilion.correction.picture_fit import PictureFit
 from vermilion.regression.model import LipModel
 from vermilion.regression.training import VARIANTS
 
@@ -22,6 +24,7 @@ class CoarseTake:
         rotation, translation_mm: `world_from_head`, (F, 3, 3) and (F, 3).
         features: (F, M); NaN where a frame has none.
         seam_mm, detail_mm: of the integration.
+        picture: of the same frames; None for the paper, which has no such thing.
     """
 
     coarse_mm: np.ndarray
@@ -32,6 +35,17 @@ class CoarseTake:
     features: np.ndarray
     seam_mm: float
     detail_mm: float = 0.0
+    picture: Picture | None = None
+
+    def __getitem__(self, rows: np.ndarray) -> CoarseTake:
+        """The same of some frames."""
+        names = ("coarse_mm", "rotation", "translation_mm", "features")
+        picture = None if self.picture is None else self.picture[rows]
+        return replace(self, **{name: getattr(self, name)[rows] for name in names}, picture=picture)
+
+    def as_in_paper(self) -> CoarseTake:
+        """Without the picture, which Lips16 leaves to future work."""
+        return replace(self, picture=None)
 
 
 def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
@@ -45,11 +59,21 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
     corrected = np.array(take.coarse_mm, dtype=np.float64)
     if not usable.any():
         return corrected, np.nan
-    # A first call compiles and warms what a long take pays for once.
-    corrector.correct(head_from_world(corrected[usable], *pose)[:1], take.features[usable][:1])
+    coarse, features, fit = corrected[usable], take.features[usable], None
+    if take.picture is not None and take.picture.settings.used:
+        fit = PictureFit.of(corrector.integrator, take.neutral_mm, take.picture)
+        picture = take.picture[usable]
+
+    def correct(rows: slice) -> np.ndarray:
+        of_rows = pose[0][rows], pose[1][rows]
+        head = corrector.correct(head_from_world(coarse[rows], *of_rows), features[rows])
+        if fit is None:
+            return world_from_head(head, *of_rows)
+        return fit.fit(head, coarse[rows], *of_rows, picture[rows])
+
+    correct(slice(1))  # compiles and warms what a long take pays for once
     start = time.perf_counter()
-    head = head_from_world(corrected[usable], *pose)
-    corrected[usable] = world_from_head(corrector.correct(head, take.features[usable]), *pose)
+    corrected[usable] = correct(slice(None))
     return corrected, (time.perf_counter() - start) / int(usable.sum())
 
 
@@ -64,7 +88,7 @@ def corrected_by_truth(
     return correct_with_layers(
         mask, layers, take.coarse_mm, take.triangles, take.neutral_mm, take.rotation,
         take.translation_mm, valid=valid, seam_mm=take.seam_mm,
-        displacement_mm=displacement_mm, detail_mm=take.detail_mm,
+        displacement_mm=displacement_mm, detail_mm=take.detail_mm, picture=take.picture,
     )  # fmt: skip
 
 

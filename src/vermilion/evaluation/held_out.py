@@ -42,8 +42,10 @@ class Regressed:
     seconds: float
 
     @classmethod
-    def of(cls, model: LipModel, take: CoarseTake) -> Regressed:
-        return cls(model, *corrected_by(model, take))
+    def of(cls, model: LipModel, take: CoarseTake, rows: np.ndarray) -> Regressed:
+        """Meshes of the frames `rows` of the take, whose other frames are their neighbours."""
+        corrected_mm, seconds = corrected_by(model, take)
+        return cls(model, corrected_mm[rows], seconds)
 
 
 def points_on_h(correspondence: Correspondence) -> SurfacePoints:

@@ -68,8 +68,8 @@ def evaluate_take(
 ) -> TakeResult:
     """Measure `base` and its corrections after one rigid alignment a frame.
 
-    The alignment is that of the base track, on the face outside the mouth mask; it is used for every
-    correction of it.
+    Every sequence is aligned on its own face outside the mouth mask: a correction may also have moved
+    the head, to lay it on the picture.
 
     Args:
         sequences_mm: regressor -> (F, V, 3) in the tracker's world; has `base`.
@@ -81,8 +81,10 @@ def evaluate_take(
             without them the reference's shape decides.
     """
     regions = regions.restricted(reference.valid)
-    rotations, translations = align_frames(sequences_mm["base"], reference.points_mm, regions.rest)
-    aligned = {name: moved(s, rotations, translations) for name, s in sequences_mm.items()}
+    aligned = {
+        name: moved(s, *align_frames(s, reference.points_mm, regions.rest))
+        for name, s in sequences_mm.items()
+    }
     neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
     head_rotations, head_translations = align_frames(reference.points_mm, neutral, regions.rest)
     if curves is not None:

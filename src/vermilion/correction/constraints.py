@@ -1,0 +1,128 @@
+"""Soft constraints on few vertices of an integrated mesh, by a low-rank update (Woodbury).
+
+The integration's energy is (x - x0)^T A (x - x0) about its solution x0, the same A for all three
+coordinates. With rows  d_i . sum_a c_ia (x - x0)_(v_ia) = r_i  of compliance s_i (the inverse of a
+weight beside the mesh's stiffness), the minimum is
+
+    x = x0 + A^-1 J^T l,      (S + diag(s)) l = r,      S_ij = (d_i . d_j) sum_ab c_ia G_(v_ia, v_jb) c_jb
+
+and G, the block of A^-1 at the vertices that rows may name, is made once a topology and person.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from vermilion.correction.integration import LayerIntegrator
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Constraints on a frame's mesh.
+
+    Attributes:
+        vertices: (m, k) vertex ids; coefficients: (m, k).
+        directions: (m, 3) unit vectors in the mesh's frame.
+        wanted: (m,) mm along the direction.
+        compliance: (m,); 0 is exact.
+        one_sided: (m,) bool: met as well where the mesh moves further along the direction.
+    """
+
+    vertices: np.ndarray
+    coefficients: np.ndarray
+    directions: np.ndarray
+    wanted: np.ndarray
+    compliance: np.ndarray
+    one_sided: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.wanted)
+
+    def __add__(self, other: Rows) -> Rows:
+        width = max(self.vertices.shape[1], other.vertices.shape[1])
+        pairs = [(getattr(self._padded(width), f.name), getattr(other._padded(width), f.name))
+                 for f in fields(self)]  # fmt: skip
+        return Rows(*(np.concatenate(pair) for pair in pairs))
+
+    def __getitem__(self, chosen: np.ndarray) -> Rows:
+        return Rows(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+    def of_mesh(self, vertices_mm: np.ndarray) -> np.ndarray:
+        """d . sum c v, (m,), of a mesh or of a displacement (V, 3)."""
+        points = (vertices_mm[self.vertices] * self.coefficients[..., None]).sum(axis=1)
+        return (points * self.directions).sum(axis=1)
+
+    def _padded(self, width: int) -> Rows:
+        spare = width - self.vertices.shape[1]
+        if spare == 0:
+            return self
+        again = np.repeat(self.vertices[:, :1], spare, axis=1)
+        vertices = np.concatenate([self.vertices, again], axis=1)
+        coefficients = np.pad(self.coefficients, ((0, 0), (0, spare)))
+        return Rows(vertices, coefficients, self.directions, self.wanted, self.compliance,
+                    self.one_sided)  # fmt: skip
+
+
+class ConstraintSolver:
+    """Adds rows to the solutions of an integrator; `vertices` (K,) are those that rows may name."""
+
+    def __init__(self, integrator: LayerIntegrator, vertices: np.ndarray):
+        self._integrator = integrator
+        n_free, n_all = len(integrator.free), int(max(vertices.max(), integrator.free.max())) + 1
+        self._row = np.full(n_all, n_free)
+        self._row[integrator.free] = np.arange(n_free)
+        named = np.asarray(vertices)[self._row[vertices] < n_free]
+        units = np.zeros((n_free, len(named)))
+        units[self._row[named], np.arange(len(named))] = 1.0
+        self._place = np.full(n_all, len(named))  # one more for vertices that cannot move
+        self._place[named] = np.arange(len(named))
+        self._inverse = np.zeros((len(named) + 1, len(named) + 1))
+        self._inverse[:-1, :-1] = integrator.factor.solve(units)[self._row[named]]
+
+    def multipliers(self, rows: Rows) -> np.ndarray:
+        """(m,) forces l along the rows; 0 where a one-sided row would have to pull back."""
+        result = np.zeros(len(rows))
+        if len(rows) == 0:
+            return result
+        system = self.response(rows, rows) + np.diag(rows.compliance + 1e-9)
+        active = np.ones(len(rows), dtype=bool)
+        for _ in range(10):
+            result[:] = 0.0
+            result[active] = np.linalg.solve(system[np.ix_(active, active)], rows.wanted[active])
+            pulling = active & rows.one_sided & (result < 0)
+            if not pulling.any():
+                break
+            active &= ~pulling
+        return np.where(rows.one_sided, np.maximum(result, 0.0), result)
+
+    def response(self, of: Rows, to: Rows) -> np.ndarray:
+        """(m, m'): what `of` measures when each force of `to` is one."""
+        inverse = np.zeros((len(of), len(to)))
+        for a in range(of.vertices.shape[1]):
+            for b in range(to.vertices.shape[1]):
+                block = self._inverse[np.ix_(self._place[of.vertices[:, a]],
+                                             self._place[to.vertices[:, b]])]  # fmt: skip
+                inverse += of.coefficients[:, a, None] * block * to.coefficients[:, b]
+        return inverse * (of.directions @ to.directions.T)
+
+    def near_moves(self, rows: Rows, multipliers: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+        """Moves (n, 3) mm of some of the named vertices."""
+        force = np.zeros((len(self._inverse), 3))
+        pushes = multipliers[:, None] * rows.directions
+        for a in range(rows.vertices.shape[1]):
+            np.add.at(
+                force, self._place[rows.vertices[:, a]], rows.coefficients[:, a, None] * pushes
+            )
+        return self._inverse[self._place[vertices]] @ force
+
+    def moves(self, rows: list[Rows], multipliers: list[np.ndarray]) -> np.ndarray:
+        """Moves (F, N, 3) mm of the integrator's free vertices, all frames solved together."""
+        force = np.zeros((len(self._integrator.free) + 1, 3, len(rows)))
+        for f, (of_frame, strength) in enumerate(zip(rows, multipliers, strict=True)):
+            pushes = strength[:, None] * of_frame.directions
+            for a in range(of_frame.vertices.shape[1]):
+                at = self._row[of_frame.vertices[:, a]]
+                np.add.at(force[..., f], at, of_frame.coefficients[:, a, None] * pushes)
+        return np.moveaxis(self._integrator.factor.solve(force[:-1]), 2, 0)

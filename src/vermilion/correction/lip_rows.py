@@ -1,0 +1,175 @@
+"""Constraints on the lips of one frame: on the found contours, touching, never one in the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.correction.constraints import Rows
+from vermilion.correction.picture import projection_jacobian
+from vermilion.faces.model import FaceModel
+from vermilion.features.rings import Ring
+from vermilion.mesh import vertex_normals
+from vermilion.multiview.contact import Lips, lips_of, penetration
+
+#: A contour point this far off counts half (mm).
+_ROBUST_MM = 2.5
+#: The inner contour is closed where it is lower than this, per inter-ocular distance.
+CLOSED = 0.012
+#: The inside of the mouth further than this from where the lips meet never touches (mm).
+_INSIDE_MM = 8.0
+#: How far in one lip another lip may lie (mm), and how far apart they are set then.
+SLACK_MM, _APART_MM = 0.01, 0.005
+
+
+@dataclass(frozen=True)
+class LipSamples:
+    """Samples on both contours of a mesh, the outer ring first.
+
+    Attributes:
+        vertices: (m, 2); coefficients: (m, 2).
+        length_mm: (m,) of contour that each stands for, on the person's neutral.
+    """
+
+    vertices: np.ndarray
+    coefficients: np.ndarray
+    length_mm: np.ndarray
+
+    @classmethod
+    def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
+        rings = (outer, inner)
+        lengths = []
+        for ring in rings:
+            points = ring.points(neutral_mm)
+            steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+            lengths.append(np.full(len(ring), steps.mean()))
+        return cls(
+            np.concatenate([np.stack([ring.start, ring.end], axis=1) for ring in rings]),
+            np.concatenate(
+                [np.stack([1 - ring.fraction, ring.fraction], axis=1) for ring in rings]
+            ),
+            np.concatenate(lengths),
+        )
+
+    def points(self, vertices_mm: np.ndarray) -> np.ndarray:
+        """Samples (..., m, 3) on meshes (..., V, 3)."""
+        return (vertices_mm[..., self.vertices, :] * self.coefficients[..., None]).sum(axis=-2)
+
+
+def contour_rows(
+    samples: LipSamples,
+    vertices_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    camera: Camera,
+    lines: tuple[np.ndarray, np.ndarray, np.ndarray],
+    weight: float,
+) -> Rows:
+    """Each sample projects on its line (point to line, depth free), linearised at the mesh.
+
+    Args:
+        vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
+        lines: (m, 2) points, (m, 2) normals, (m,) known, of `Picture.lines`.
+        weight: of a millimetre of contour.
+    """
+    points_px, normals, known = lines
+    world = samples.points(vertices_mm) @ rotation.T + translation_mm
+    across = np.einsum("mk,mkj->mj", normals, projection_jacobian(camera, world) @ rotation)
+    px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
+    counts = weight * samples.length_mm / (1.0 + (off_mm / _ROBUST_MM) ** 2)
+    rows = Rows(
+        samples.vertices, samples.coefficients, across / px_per_mm[:, None], off_mm, 1.0 / counts,
+        np.zeros(len(off_mm), dtype=bool),
+    )  # fmt: skip
+    return rows[known & np.isfinite(off_mm)]
+
+
+def touch_rows(
+    samples: LipSamples,
+    vertices_mm: np.ndarray,
+    inner_px: np.ndarray,
+    known: np.ndarray,
+    unit_px: float,
+    view: np.ndarray,
+    weight: float,
+) -> Rows:
+    """Where the inner contour is closed in the picture, its upper and lower samples meet.
+
+    Args:
+        vertices_mm: (V, 3) head frame.
+        inner_px: (n, 2) found inner ring, known (n,).
+        unit_px: inter-ocular distance.
+        view: (3,) unit direction of the view in the head frame: it and the vertical are held, along
+            the mouth the lips slide.
+        weight: of a millimetre of contour.
+    """
+    n = len(inner_px)
+    upper = np.arange(1, n // 2)
+    lower = n - upper
+    apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
+    closed = (apart < CLOSED) & known[upper] & known[lower]
+    upper, lower = (
+        len(samples.vertices) - n + upper[closed],
+        len(samples.vertices) - n + lower[closed],
+    )
+    vertices = np.concatenate([samples.vertices[upper], samples.vertices[lower]], axis=1)
+    coefficients = np.concatenate(
+        [samples.coefficients[upper], -samples.coefficients[lower]], axis=1
+    )
+    vertical = np.array([0.0, 1.0, 0.0]) - view[1] * view
+    axes = np.stack([view, vertical / np.linalg.norm(vertical)])
+    directions = np.repeat(axes, len(upper), axis=0)
+    vertices, coefficients = np.tile(vertices, (2, 1)), np.tile(coefficients, (2, 1))
+    compliance = 1.0 / (weight * np.tile(samples.length_mm[upper], 2))
+    rows = Rows(vertices, coefficients, directions, np.zeros(len(vertices)), compliance,
+                np.zeros(len(vertices), dtype=bool))  # fmt: skip
+    rows.wanted[:] = -rows.of_mesh(vertices_mm)
+    return rows
+
+
+class LipCollision:
+    """Finds where one lip lies in the other.
+
+    Attributes:
+        vertices: (K,) ids of the lips and their surroundings, ascending.
+    """
+
+    def __init__(self, face: FaceModel, neutral_mm: np.ndarray):
+        lips = lips_of(face)
+        meeting = neutral_mm[face.inner_contour]
+        red = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
+
+        def near(ids: np.ndarray) -> np.ndarray:
+            distance = np.linalg.norm(neutral_mm[ids, None] - meeting, axis=2).min(axis=1)
+            return ids[red[ids] | (distance < _INSIDE_MM)]
+
+        upper, lower = near(lips.upper), near(lips.lower)
+        member = np.zeros(len(neutral_mm), dtype=bool)
+        member[upper] = member[lower] = True
+        triangles = face.triangles[member[face.triangles].any(axis=1)]
+        self.vertices = np.unique(triangles)
+        self._triangles = np.searchsorted(self.vertices, triangles)
+        self._lips = Lips(
+            np.searchsorted(self.vertices, upper), np.searchsorted(self.vertices, lower)
+        )
+
+    def rows(self, before_mm: np.ndarray, now_mm: np.ndarray) -> tuple[Rows, float]:
+        """(one-sided rows that part what lies inside now, greatest depth in mm).
+
+        Args:
+            before_mm, now_mm: (K, 3) of `vertices`; rows are for moves from before.
+        """
+        normals = vertex_normals(now_mm, self._triangles)
+        ids, near, depth = penetration(now_mm, normals, self._lips)
+        deep = depth > SLACK_MM
+        ids, near = ids[deep], near[deep]
+        directions = normals[near]
+        pairs = np.stack([ids, near], axis=1)
+        signs = np.tile([1.0, -1.0], (len(ids), 1))
+        wanted = _APART_MM - ((before_mm[ids] - before_mm[near]) * directions).sum(axis=1)
+        rows = Rows(self.vertices[pairs], signs, directions, wanted, np.full(len(ids), 1e-5),
+                    np.ones(len(ids), dtype=bool))  # fmt: skip
+        return rows, float(depth.max(initial=0.0))

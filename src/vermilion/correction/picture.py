@@ -1,0 +1,116 @@
+"""What the picture says of the lips: lines that the contours of a mesh must project on.
+
+A found contour point fixes the mesh along the contour's normal only: where along the contour a
+sample belongs is not seen, nor its depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vermilion.camera import Camera
+from vermilion.faces.model import FaceModel
+from vermilion.features.search import inward_normals, smoothed_ring
+
+#: What a picture takes from feature files.
+PICTURE_ARRAYS = ("outer_px", "inner_px", "outer_found", "inner_found", "valid")
+
+
+@dataclass(frozen=True)
+class PictureSettings:
+    """How the picture counts; all at 0 or False: not at all, which is the paper.
+
+    Attributes:
+        repose: whether the corrected head is laid on the picture again.
+        repose_frames: deviation of the symmetric filter over time of that motion, frames.
+        contour_weight: of a millimetre of contour beside the mesh's stiffness.
+        contact: whether lips that touch in the picture meet, and never pass through each other.
+    """
+
+    repose: bool = True
+    repose_frames: float = 3.0
+    contour_weight: float = 1.0
+    contact: bool = True
+
+    @property
+    def used(self) -> bool:
+        return self.repose or self.contour_weight > 0 or self.contact
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Lip contours in the pictures of some frames.
+
+    Attributes:
+        face: the model that the mesh is of, for its contours and landmarks.
+        camera: of the pictures.
+        frames: (F,) frame numbers.
+        outer_px, inner_px: (F, n, 2) rings of points, sample k found from sample k of the mesh.
+        outer_found, inner_found: (F, n) bool.
+        settings: how all this counts.
+    """
+
+    face: FaceModel
+    camera: Camera
+    frames: np.ndarray
+    outer_px: np.ndarray
+    inner_px: np.ndarray
+    outer_found: np.ndarray
+    inner_found: np.ndarray
+    settings: PictureSettings = field(default_factory=PictureSettings)
+
+    @classmethod
+    def of(
+        cls,
+        face: FaceModel,
+        camera: Camera,
+        frames: np.ndarray,
+        features: dict[str, np.ndarray],
+        settings: PictureSettings,
+    ) -> Picture:
+        """Of the arrays `PICTURE_ARRAYS` of feature files; in a frame that is not valid nothing is found."""
+        valid = features["valid"][:, None]
+        return cls(
+            face, camera, np.asarray(frames), features["outer_px"], features["inner_px"],
+            features["outer_found"] & valid, features["inner_found"] & valid, settings,
+        )  # fmt: skip
+
+    def __getitem__(self, chosen: np.ndarray) -> Picture:
+        """The same of some frames, by rows or (F,) bool."""
+        names = ("frames", "outer_px", "inner_px", "outer_found", "inner_found")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(points (F, 2n, 2) px, unit normals (F, 2n, 2), known (F, 2n) bool), outer ring first."""
+        points = np.concatenate([self.outer_px, self.inner_px], axis=1)
+        normals = np.stack(
+            [
+                np.concatenate([inward_normals(smoothed_ring(ring, 2)) for ring in pair])
+                for pair in zip(self.outer_px, self.inner_px, strict=True)
+            ]
+        )
+        known = np.concatenate([self.outer_found, self.inner_found], axis=1)
+        turns = np.concatenate([_turning(self.outer_px), _turning(self.inner_px)], axis=1)
+        return points, normals, known & ~turns
+
+
+def frames_around(frames: np.ndarray, known: np.ndarray, reach: int) -> np.ndarray:
+    """Those of the `known` frame numbers that lie within `reach` of one of `frames`, ascending."""
+    apart = np.abs(np.subtract.outer(np.sort(known), np.asarray(frames)))
+    return np.sort(known)[apart.min(axis=1) <= reach]
+
+
+def _turning(rings_px: np.ndarray) -> np.ndarray:
+    """(F, n) bool: where rings (F, n, 2) run back on themselves, as at the corner of a closed mouth."""
+    back, ahead = rings_px - np.roll(rings_px, 1, axis=1), np.roll(rings_px, -1, axis=1) - rings_px
+    product = np.linalg.norm(back, axis=2) * np.linalg.norm(ahead, axis=2)
+    return (back * ahead).sum(axis=2) < 0.3 * product
+
+
+def projection_jacobian(camera: Camera, points_mm: np.ndarray, step_mm: float = 0.05) -> np.ndarray:
+    """Derivative (..., 2, 3) px / mm of the projection at world points (..., 3)."""
+    axes = step_mm * np.eye(3)
+    columns = [camera.project(points_mm + a) - camera.project(points_mm - a) for a in axes]
+    return np.stack(columns, axis=-1) / (2 * step_mm)

@@ -1,0 +1,134 @@
+"""The corrected mesh made to agree with the picture: pose, contours, contact, in that order.
+
+Layers give detail, displacements the place over long ranges; where the lips lie in the picture is seen,
+so it is not left to either (Lips16 section 7 names contours as constraints of the solve as future work).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.correction.constraints import ConstraintSolver, Rows
+from vermilion.correction.integration import LayerIntegrator
+from vermilion.correction.lip_rows import LipCollision, LipSamples, contour_rows, touch_rows
+from vermilion.correction.picture import Picture, PictureSettings
+from vermilion.correction.repose import ANCHORS, moved, repose_motion, smoothed_motion
+from vermilion.correction.rotations import rotation_matrix
+from vermilion.faces.model import FaceModel
+from vermilion.features.contour_features import interocular_px
+from vermilion.features.rings import lip_rings
+from vermilion.landmarks.scheme import EYE_CORNERS
+
+#: Least share of known contour points for a frame's own motion.
+_LEAST_KNOWN = 0.3
+_ROUNDS = 8
+
+
+class PictureFit:
+    """Binds the lips of a person's mesh to an integrator; build it once."""
+
+    def __init__(
+        self,
+        integrator: LayerIntegrator,
+        neutral_mm: np.ndarray,
+        face: FaceModel,
+        n_samples: int,
+        settings: PictureSettings,
+    ):
+        self.settings = settings
+        self._samples = LipSamples.of(*lip_rings(face, n_samples), neutral_mm)
+        self._anchors = face.landmarks[ANCHORS]
+        self._eyes = face.landmarks[EYE_CORNERS]
+        self._pivot = neutral_mm.mean(axis=0)
+        self._free = integrator.free
+        self._collision = LipCollision(face, neutral_mm)
+        named = np.union1d(self._samples.vertices, self._collision.vertices)
+        self._solver = ConstraintSolver(integrator, named)
+
+    @classmethod
+    def of(
+        cls, integrator: LayerIntegrator, neutral_mm: np.ndarray, picture: Picture
+    ) -> PictureFit:
+        """Bound to the face and the number of samples of a picture."""
+        n_samples = picture.outer_px.shape[1]
+        return cls(integrator, neutral_mm, picture.face, n_samples, picture.settings)
+
+    def fit(
+        self,
+        corrected: np.ndarray,
+        coarse_mm: np.ndarray,
+        rotation: np.ndarray,
+        translation_mm: np.ndarray,
+        picture: Picture,
+    ) -> np.ndarray:
+        """Meshes (F, V, 3) in the world that agree with the picture.
+
+        Args:
+            corrected: (F, V, 3) head frame, as the integrator leaves them.
+            coarse_mm: (F, V, 3) C in the world; rotation, translation_mm: its `world_from_head`.
+            picture: of the same frames.
+        """
+        lines = picture.lines()
+        unit_px = np.array([interocular_px(v[self._eyes], picture.camera) for v in coarse_mm])
+        if self.settings.repose:
+            rotation, translation_mm = self._reposed(
+                corrected, coarse_mm, rotation, translation_mm, picture, lines, unit_px
+            )
+        corrected = np.array(corrected)
+        constraints = [
+            self._constrained(
+                corrected[f], rotation[f], translation_mm[f], picture, f,
+                tuple(part[f] for part in lines), float(unit_px[f]),
+            )
+            for f in range(len(corrected))
+        ]  # fmt: skip
+        if constraints:
+            rows, forces = zip(*constraints, strict=True)
+            corrected[:, self._free] += self._solver.moves(list(rows), list(forces))
+        return corrected @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
+
+    def _reposed(self, corrected, coarse_mm, rotation, translation_mm, picture, lines, unit_px):
+        """`world_from_head` after the corrected heads are laid on the picture."""
+        turn = np.swapaxes(rotation, 1, 2)
+        pivot = self._pivot @ turn + translation_mm
+        motion = repose_motion(
+            corrected[:, self._anchors] @ turn + translation_mm[:, None],
+            picture.camera.project(coarse_mm[:, self._anchors]),
+            self._samples.points(corrected) @ turn + translation_mm[:, None],
+            lines, pivot, unit_px, picture.camera,
+        )  # fmt: skip
+        known = lines[2].mean(axis=1) >= _LEAST_KNOWN
+        motion = smoothed_motion(motion, known, picture.frames, self.settings.repose_frames)
+        origin = moved(translation_mm[:, None], pivot, motion)[:, 0]
+        return rotation_matrix(motion[:, :3]) @ rotation, origin
+
+    def _constrained(
+        self, vertices, rotation, translation_mm, picture, f, lines, unit_px
+    ) -> tuple[Rows, np.ndarray]:
+        """Rows of a frame and the forces along them."""
+        weight, n = self.settings.contour_weight, picture.inner_px.shape[1]
+        rows = contour_rows(
+            self._samples, vertices, rotation, translation_mm, picture.camera, lines, weight or 1.0
+        )
+        if weight == 0:
+            rows = rows[:0]
+        if not self.settings.contact:
+            return rows, self._solver.multipliers(rows)
+        if weight > 0:
+            view = vertices[self._eyes].mean(axis=0) @ rotation.T + translation_mm
+            view = (view - picture.camera.centre_mm) @ rotation
+            rows += touch_rows(
+                self._samples, vertices, picture.inner_px[f], lines[2][n:], unit_px,
+                view / np.linalg.norm(view), weight,
+            )  # fmt: skip
+        ids = self._collision.vertices
+        for _ in range(_ROUNDS):
+            forces = self._solver.multipliers(rows)
+            now = vertices[ids] + self._solver.near_moves(rows, forces, ids)
+            parting, _ = self._collision.rows(vertices[ids], now)
+            if len(parting) == 0:
+                break
+            rows += parting
+        else:
+            forces = self._solver.multipliers(rows)
+        return rows, forces

@@ -1,0 +1,217 @@
+"""The picture as a constraint on a corrected mesh: contours, contact, pose, neighbours in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from tests import lip_patch
+from vermilion.correction.apply import correct_with_layers
+from vermilion.correction.constraints import ConstraintSolver, Rows
+from vermilion.correction.integration import LayerIntegrator
+from vermilion.correction.picture import Picture, PictureSettings, frames_around
+from vermilion.correction.picture_fit import PictureFit
+from vermilion.correction.repose import ANCHORS, smoothed_motion
+from vermilion.correction.rotations import rotation_matrix
+from vermilion.features.rings import lip_rings
+from vermilion.mesh import vertex_normals
+from vermilion.multiview.contact import lips_of, penetration
+
+N_SAMPLES = 80
+CAMERA = lip_patch.cameras()["front"]
+OFF = PictureSettings(repose=False, contour_weight=0.0, contact=False)
+CONTOURS = replace(OFF, contour_weight=1000.0)
+REPOSE = replace(OFF, repose=True)
+
+
+def face():
+    """The lip patch with corners of the mouth, and its rim in the place of eyes and brows."""
+    model = lip_patch.face_model()
+    landmarks = np.zeros(66, dtype=np.int32)
+    row = lip_patch.LIP_ROWS * lip_patch.COLUMNS
+    landmarks[58], landmarks[62] = row + lip_patch.COLUMNS // 2, row
+    rim = (lip_patch.ROWS - 1) * lip_patch.COLUMNS
+    landmarks[ANCHORS] = rim + np.linspace(0, lip_patch.COLUMNS, len(ANCHORS), endpoint=False)
+    landmarks[36], landmarks[45] = rim + lip_patch.COLUMNS // 2, rim
+    return replace(model, landmarks=landmarks)
+
+
+FACE = face()
+#: The mask of the layers: all but the outer rows.
+MASK = np.flatnonzero((FACE.triangles < 22 * lip_patch.COLUMNS).all(axis=1))
+
+
+def integrator():
+    return LayerIntegrator(FACE.neutral_mm, FACE.triangles, MASK, seam_mm=0.0)
+
+
+def picture_of(meshes_mm, settings, pose=None):
+    """What a perfect search finds in the pictures of meshes (F, V, 3) in the world."""
+    rotation, translation = pose or (np.eye(3), np.zeros(3))
+    world = np.asarray(meshes_mm) @ rotation.T + translation
+    outer, inner = (CAMERA.project(ring.points(world)) for ring in lip_rings(FACE, N_SAMPLES))
+    known = np.ones(outer.shape[:2], dtype=bool)
+    frames = np.arange(len(world))
+    return Picture(FACE, CAMERA, frames, outer, inner, known, known, settings)
+
+
+def fitted(corrected, picture, coarse=None, pose=None):
+    n = len(corrected)
+    rotation, translation = pose or (np.eye(3), np.zeros(3))
+    rotation, translation = np.tile(rotation, (n, 1, 1)), np.tile(translation, (n, 1))
+    coarse = corrected if coarse is None else coarse
+    coarse = coarse @ np.swapaxes(rotation, 1, 2) + translation[:, None]
+    fit = PictureFit.of(integrator(), FACE.neutral_mm, picture)
+    return fit.fit(corrected, coarse, rotation, translation, picture)
+
+
+def distance_px(mesh_mm, picture, f=0):
+    """Distance of the samples of a mesh (V, 3) from their lines, (m,) px, where these are known."""
+    points, normals, known = (part[f] for part in picture.lines())
+    samples = np.concatenate([ring.points(mesh_mm) for ring in lip_rings(FACE, N_SAMPLES)])
+    return np.abs(((CAMERA.project(samples) - points) * normals).sum(axis=1))[known]
+
+
+def depth_in_other_lip(mesh_mm):
+    found = penetration(mesh_mm, vertex_normals(mesh_mm, FACE.triangles), lips_of(FACE))
+    return float(found[2].max(initial=0.0))
+
+
+def test_low_rank_update_is_the_minimum_of_the_whole_energy():
+    solid, rng = integrator(), np.random.default_rng(0)
+    vertices = rng.choice(solid.free, size=(12, 2), replace=False)
+    directions = rng.normal(size=(12, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    rows = Rows(
+        vertices, rng.uniform(0.2, 1, (12, 2)), directions, rng.normal(size=12),
+        rng.uniform(0.1, 2, 12), np.zeros(12, dtype=bool),
+    )  # fmt: skip
+    solver = ConstraintSolver(solid, np.unique(vertices))
+    forces = solver.multipliers(rows)
+    move = np.zeros((FACE.n_vertices, 3))
+    move[solid.free] = solver.moves([rows], [forces])[0]
+    jacobian = sparse.lil_matrix((12, 3 * FACE.n_vertices))
+    for i, (pair, shares) in enumerate(zip(vertices, rows.coefficients, strict=True)):
+        for vertex, share in zip(pair, shares, strict=True):
+            jacobian[i, 3 * vertex : 3 * vertex + 3] += share * directions[i]
+    pull = jacobian.T @ ((rows.wanted - jacobian @ move.ravel()) / rows.compliance)
+    balance = solid.matrix @ move[solid.free] - pull.reshape(-1, 3)[solid.free]
+    assert np.abs(balance).max() < 1e-8
+    near = solver.near_moves(rows, forces, vertices.ravel())
+    np.testing.assert_allclose(near, move[vertices.ravel()], atol=1e-9)
+
+
+def test_a_one_sided_row_never_pulls():
+    solid = integrator()
+    vertex = solid.free[len(solid.free) // 2]
+    rows = Rows(
+        np.array([[vertex], [vertex]]), np.ones((2, 1)), np.array([[0, 1.0, 0], [1.0, 0, 0]]),
+        np.array([-0.4, 0.3]), np.zeros(2), np.ones(2, dtype=bool),
+    )  # fmt: skip
+    solver = ConstraintSolver(solid, np.array([vertex]))
+    moved = solver.near_moves(rows, solver.multipliers(rows), np.array([vertex]))[0]
+    np.testing.assert_allclose(moved, [0.3, 0.0, 0.0], atol=1e-6)
+
+
+def test_contours_go_to_their_lines_and_depth_stays():
+    before = lip_patch.vertices_at(0.6, 0.0)
+    picture = picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
+    after = fitted(before[None], picture)[0]
+    assert distance_px(before, picture).max() > 2.0
+    assert distance_px(after, picture).max() < 0.1
+    moved = after - before
+    lips = np.unique(np.concatenate([FACE.outer_contour, FACE.inner_contour]))
+    view = before[lips] - CAMERA.centre_mm
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    assert (
+        np.abs((moved[lips] * view).sum(axis=1)).max() < 0.05 * np.linalg.norm(moved, axis=1).max()
+    )
+
+
+def test_gradients_across_the_picture_stay():
+    before = lip_patch.vertices_at(0.6, 0.0)
+    moved = (
+        fitted(before[None], picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS))[0] - before
+    )
+    edges = FACE.triangles[MASK]
+    change = np.abs(moved[edges[:, 1:]] - moved[edges[:, :1]]).mean(axis=(0, 1))
+    assert change[:2].min() > 0.01
+    assert change[2] < 0.05 * change[:2].max()  # the view is along z
+
+
+def test_points_that_were_not_found_do_not_pull():
+    before = lip_patch.vertices_at(0.6, 0.0)
+    picture = picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
+    nothing = np.zeros_like(picture.outer_found)
+    blind = replace(picture, outer_found=nothing, inner_found=nothing)
+    np.testing.assert_allclose(fitted(before[None], blind)[0], before, atol=1e-12)
+
+
+def test_switched_off_the_result_is_that_of_the_paper():
+    before = lip_patch.vertices_at(0.6, 0.0)[None]
+    layers = np.random.default_rng(1).normal(scale=0.02, size=(1, len(MASK), 9))
+    pose = np.eye(3)[None], np.zeros((1, 3))
+    arguments = MASK, layers, before, FACE.triangles, FACE.neutral_mm, *pose
+    paper = correct_with_layers(*arguments)
+    off = correct_with_layers(*arguments, picture=picture_of(before, OFF))
+    on = correct_with_layers(*arguments, picture=picture_of(before, CONTOURS))
+    assert np.array_equal(off, paper)
+    assert not np.allclose(on, paper)
+
+
+@pytest.mark.parametrize("weight", [0.0, 1.0])
+def test_lips_that_pass_through_each_other_are_parted(weight):
+    through = lip_patch.vertices_at(-3.0, 0.0)
+    assert depth_in_other_lip(through) > 0.3
+    settings = replace(OFF, contact=True, contour_weight=weight)
+    after = fitted(through[None], picture_of([through], settings))[0]
+    assert depth_in_other_lip(after) <= 0.01
+
+
+def test_lips_that_touch_in_the_picture_touch_in_the_mesh():
+    gap = FACE.inner_contour[[lip_patch.COLUMNS // 4, 3 * lip_patch.COLUMNS // 4]]
+    closed, ajar = lip_patch.vertices_at(-2.35, 0.0), lip_patch.vertices_at(0.5, 0.0)
+    ajar[FACE.regions["vermilion_upper"], 2] += 1.0  # and one lip before the other
+    settings = replace(OFF, contact=True, contour_weight=100.0)
+    after = fitted(ajar[None], picture_of([closed], settings))[0]
+    assert np.linalg.norm(ajar[gap[0]] - ajar[gap[1]]) > 2.5
+    assert np.linalg.norm((after[gap[0]] - after[gap[1]])[1:]) < 0.2
+    assert depth_in_other_lip(after) <= 0.01
+
+
+def test_a_head_beside_its_picture_is_laid_on_it():
+    mesh = lip_patch.vertices_at(2.0, 0.1)[None]
+    pose = rotation_matrix(np.array([0.0, 0.02, 0.01])), np.array([1.0, -1.5, 0.0])
+    picture = picture_of(mesh, REPOSE)
+    rotation, translation = pose
+    coarse = (mesh - translation) @ rotation  # its eyes and brows project where they should
+    after = fitted(mesh, picture, coarse=coarse, pose=pose)[0]
+    assert distance_px(mesh[0] @ rotation.T + translation, picture).mean() > 3.0
+    assert distance_px(after, picture).mean() < 0.2
+
+
+def test_the_filter_over_time_has_no_lag_and_keeps_what_is_steady():
+    frames, known = np.arange(41), np.ones(41, dtype=bool)
+    steady = smoothed_motion(np.ones((41, 6)), known, frames, 3.0)
+    np.testing.assert_allclose(steady, 1.0)
+    impulse = np.zeros((41, 6))
+    impulse[20] = 1.0
+    found = smoothed_motion(impulse, known, frames, 3.0)[:, 0]
+    np.testing.assert_allclose(found, found[::-1], atol=1e-15)
+    assert found.argmax() == 20
+    known[20] = False  # a frame without a motion of its own has its neighbours'
+    assert smoothed_motion(np.where(known[:, None], 2.0, np.nan), known, frames, 3.0)[20, 0] == 2.0
+
+
+def test_results_do_not_depend_on_the_chunk():
+    settings = PictureSettings(repose_frames=1.0)
+    rng = np.random.default_rng(2)
+    shapes = np.stack([lip_patch.vertices_at(o, 0.05) for o in rng.uniform(0, 4, 16)])
+    picture = picture_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)), settings)
+    whole = fitted(shapes, picture)
+    asked = np.array([5, 6, 7])
+    near = frames_around(asked, np.arange(16), 3)
+    assert near.tolist() == list(range(2, 11))
+    part = fitted(shapes[near], picture[near])[np.searchsorted(near, asked)]
+    np.testing.assert_allclose(part, whole[asked], rtol=0, atol=1e-9)
