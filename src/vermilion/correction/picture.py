@@ -84,22 +84,28 @@ class Picture:
 
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(points (F, 2n, 2) px, unit normals (F, 2n, 2), known (F, 2n) bool), outer ring first."""
-        points = np.concatenate([self.outer_px, self.inner_px], axis=1)
-        normals = np.stack(
-            [
-                np.concatenate([inward_normals(smoothed_ring(ring, 2)) for ring in pair])
-                for pair in zip(self.outer_px, self.inner_px, strict=True)
-            ]
+        outer, inner = (
+            _ring_lines(*ring)
+            for ring in ((self.outer_px, self.outer_found), (self.inner_px, self.inner_found))
         )
-        known = np.concatenate([self.outer_found, self.inner_found], axis=1)
-        turns = np.concatenate([_turning(self.outer_px), _turning(self.inner_px)], axis=1)
-        return points, normals, known & ~turns
+        return tuple(np.concatenate(parts, axis=1) for parts in zip(outer, inner, strict=True))
 
 
 def frames_around(frames: np.ndarray, known: np.ndarray, reach: int) -> np.ndarray:
     """Those of the `known` frame numbers that lie within `reach` of one of `frames`, ascending."""
     apart = np.abs(np.subtract.outer(np.sort(known), np.asarray(frames)))
     return np.sort(known)[apart.min(axis=1) <= reach]
+
+
+def _ring_lines(
+    rings_px: np.ndarray, found: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`Picture.lines` of one kind of ring, (F, n, 2) and (F, n)."""
+    known = found & np.isfinite(rings_px).all(axis=2)
+    points, normals = np.nan_to_num(rings_px), np.zeros(rings_px.shape)
+    for f, ring in enumerate(points):
+        normals[f] = inward_normals(smoothed_ring(ring, 2))
+    return points, normals, known & ~_turning(points)
 
 
 def _turning(rings_px: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from tests.stages.test_correction import (
     run_train,
 )
 from vermilion.config.apply import OverlayConfig
+from vermilion.config.correction import PictureConfig
 from vermilion.config.evaluation import (
     ContourConfig,
     EvaluationConfig,
@@ -37,6 +38,7 @@ CFG = {
     "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
     "evaluation.figures.map_frames": 2,
     "correction.integration": {"seam_mm": 8.0, "detail_mm": 15.0},
+    "correction.picture": PictureConfig().model_dump(),
     "apply.overlay": OverlayConfig(panel_height_px=160).model_dump(),
     "apply.export": {"obj": True, "usd": True},
 }

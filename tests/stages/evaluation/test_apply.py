@@ -12,7 +12,7 @@ from tests.stages.lip_scene import BAD_FRAME, CHUNKS
 from tests.stages.run_script import run_script
 from vermilion.evaluation.files import load_arrays, save_arrays
 from vermilion.images import write_srgb8
-from vermilion.sequences import read_mesh, read_sequence, write_sequence
+from vermilion.sequences import read_mesh, read_sequence
 from vermilion.tables import read_table
 from vermilion.video import VideoReader
 
@@ -24,15 +24,6 @@ def apply_chunk(scene, frames, pictures, out):
     take = scene.root / f"takes/{SUBJECT}/rom"
     first, last = frames[0], frames[-1]
     name = f"{first:06d}-{last:06d}"
-    coarse, given = (out / f"in/{name}.npy"), (out / f"in/{name}.npz")
-    meshes = read_sequence([take / f"tracking/C/{c}.npy" for c in CHUNKS])
-    write_sequence(coarse, meshes[first : last + 1])
-    arrays = [load_arrays(take / f"correction/features/{c}.npz") for c in CHUNKS]
-    joined = {
-        key: np.concatenate([part[key] for part in arrays])[first : last + 1]
-        for key in ("features", "valid")
-    }
-    save_arrays(given, joined)
     run_script(
         "apply",
         wildcards={"subject": SUBJECT, "take": "rom"},
@@ -43,8 +34,8 @@ def apply_chunk(scene, frames, pictures, out):
             "tracker": scene.root / "face/tracker.npz",
             "identity": scene.root / f"subjects/{SUBJECT}/identity.npz",
             "fit": take / "tracking/fit.npz",
-            "coarse": coarse,
-            "features": given,
+            "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
+            "features": [take / f"correction/features/{c}.npz" for c in CHUNKS],
             "model": scene.root / "models/MS.h5",
         },
         output={
