@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests import lip_patch
 from tests.unit.evaluation_face import mouth_triangles, sheet_face
 from vermilion.camera import look_at, pinhole
 from vermilion.evaluation.errors import ClipSums, second_differences
+from vermilion.evaluation.lips import lip_depths
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import Reference
@@ -88,6 +90,13 @@ def test_lips_that_gape_where_truth_touches_are_counted(face):
     assert value["false_open_rate", "mouth", "MS"] == 1.0  # two of six frames touch
     assert result.sums["MS"].sums["mouth.touch_frames"].sum() == 2
     assert value["aperture_error_mm", "mouth", "MS"] == pytest.approx(1.6, abs=1e-9)
+
+
+def test_depth_of_one_lip_in_the_other():
+    apart, through = lip_patch.vertices_at(2.0, 0.0), lip_patch.vertices_at(-3.0, 0.0)
+    depths = lip_depths(np.stack([apart, through]), lip_patch.face_model())
+    assert depths[0] == 0.0
+    assert 0.3 < depths[1] < 3.0
 
 
 def test_jitter_is_that_of_the_result_beyond_the_truth(face):

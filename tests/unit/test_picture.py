@@ -10,13 +10,12 @@ from tests import lip_patch
 from vermilion.correction.apply import correct_with_layers
 from vermilion.correction.constraints import ConstraintSolver, Rows
 from vermilion.correction.integration import LayerIntegrator
+from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.picture import Picture, PictureSettings, frames_around
 from vermilion.correction.picture_fit import PictureFit
 from vermilion.correction.repose import ANCHORS, smoothed_motion
 from vermilion.correction.rotations import rotation_matrix
 from vermilion.features.rings import lip_rings
-from vermilion.mesh import vertex_normals
-from vermilion.multiview.contact import lips_of, penetration
 
 N_SAMPLES = 80
 CAMERA = lip_patch.cameras()["front"]
@@ -74,8 +73,7 @@ def distance_px(mesh_mm, picture, f=0):
 
 
 def depth_in_other_lip(mesh_mm):
-    found = penetration(mesh_mm, vertex_normals(mesh_mm, FACE.triangles), lips_of(FACE))
-    return float(found[2].max(initial=0.0))
+    return LipCrossings(FACE).find(mesh_mm).deepest_mm
 
 
 def test_low_rank_update_is_the_minimum_of_the_whole_energy():

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy import sparse
 
 from vermilion.correction.integration import LayerIntegrator
 
@@ -41,6 +42,8 @@ class Rows:
         return len(self.wanted)
 
     def __add__(self, other: Rows) -> Rows:
+        if len(other) == 0:
+            return self
         width = max(self.vertices.shape[1], other.vertices.shape[1])
         pairs = [(getattr(self._padded(width), f.name), getattr(other._padded(width), f.name))
                  for f in fields(self)]  # fmt: skip
@@ -71,15 +74,16 @@ class ConstraintSolver:
     def __init__(self, integrator: LayerIntegrator, vertices: np.ndarray):
         self._integrator = integrator
         n_free, n_all = len(integrator.free), int(max(vertices.max(), integrator.free.max())) + 1
-        self._row = np.full(n_all, n_free)
-        self._row[integrator.free] = np.arange(n_free)
-        named = np.asarray(vertices)[self._row[vertices] < n_free]
+        row = np.full(n_all, n_free)
+        row[integrator.free] = np.arange(n_free)
+        named = np.asarray(vertices)[row[vertices] < n_free]
+        self._named_rows = row[named]
         units = np.zeros((n_free, len(named)))
-        units[self._row[named], np.arange(len(named))] = 1.0
+        units[self._named_rows, np.arange(len(named))] = 1.0
         self._place = np.full(n_all, len(named))  # one more for vertices that cannot move
         self._place[named] = np.arange(len(named))
         self._inverse = np.zeros((len(named) + 1, len(named) + 1))
-        self._inverse[:-1, :-1] = integrator.factor.solve(units)[self._row[named]]
+        self._inverse[:-1, :-1] = integrator.factor.solve(units)[self._named_rows]
 
     def multipliers(self, rows: Rows) -> np.ndarray:
         """(m,) forces l along the rows; 0 where a one-sided row would have to pull back."""
@@ -99,30 +103,26 @@ class ConstraintSolver:
 
     def response(self, of: Rows, to: Rows) -> np.ndarray:
         """(m, m'): what `of` measures when each force of `to` is one."""
-        inverse = np.zeros((len(of), len(to)))
-        for a in range(of.vertices.shape[1]):
-            for b in range(to.vertices.shape[1]):
-                block = self._inverse[np.ix_(self._place[of.vertices[:, a]],
-                                             self._place[to.vertices[:, b]])]  # fmt: skip
-                inverse += of.coefficients[:, a, None] * block * to.coefficients[:, b]
+        inverse = self._shares(of) @ (self._shares(to) @ self._inverse).T
         return inverse * (of.directions @ to.directions.T)
 
     def near_moves(self, rows: Rows, multipliers: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         """Moves (n, 3) mm of some of the named vertices."""
-        force = np.zeros((len(self._inverse), 3))
-        pushes = multipliers[:, None] * rows.directions
-        for a in range(rows.vertices.shape[1]):
-            np.add.at(
-                force, self._place[rows.vertices[:, a]], rows.coefficients[:, a, None] * pushes
-            )
+        force = self._shares(rows).T @ (multipliers[:, None] * rows.directions)
         return self._inverse[self._place[vertices]] @ force
 
     def moves(self, rows: list[Rows], multipliers: list[np.ndarray]) -> np.ndarray:
         """Moves (F, N, 3) mm of the integrator's free vertices, all frames solved together."""
-        force = np.zeros((len(self._integrator.free) + 1, 3, len(rows)))
+        force = np.zeros((len(self._integrator.free), 3, len(rows)))
         for f, (of_frame, strength) in enumerate(zip(rows, multipliers, strict=True)):
-            pushes = strength[:, None] * of_frame.directions
-            for a in range(of_frame.vertices.shape[1]):
-                at = self._row[of_frame.vertices[:, a]]
-                np.add.at(force[..., f], at, of_frame.coefficients[:, a, None] * pushes)
-        return np.moveaxis(self._integrator.factor.solve(force[:-1]), 2, 0)
+            pushes = self._shares(of_frame).T @ (strength[:, None] * of_frame.directions)
+            force[self._named_rows, :, f] = pushes[:-1]
+        return np.moveaxis(self._integrator.factor.solve(force), 2, 0)
+
+    def _shares(self, rows: Rows) -> sparse.csr_matrix:
+        """(m, K + 1): each row's coefficients at the named vertices."""
+        count, width = rows.vertices.shape
+        starts = np.arange(0, count * width + 1, width)
+        at = self._place[rows.vertices].ravel()
+        shape = (count, len(self._inverse))
+        return sparse.csr_matrix((rows.coefficients.ravel(), at, starts), shape=shape)

@@ -8,18 +8,14 @@ import numpy as np
 
 from vermilion.camera import Camera
 from vermilion.correction.constraints import Rows
+from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.picture import projection_jacobian
-from vermilion.faces.model import FaceModel
 from vermilion.features.rings import Ring
-from vermilion.mesh import vertex_normals
-from vermilion.multiview.contact import Lips, lips_of, penetration
 
 #: A contour point this far off counts half (mm).
 _ROBUST_MM = 2.5
 #: The inner contour is closed where it is lower than this, per inter-ocular distance.
 CLOSED = 0.012
-#: The inside of the mouth further than this from where the lips meet never touches (mm).
-_INSIDE_MM = 8.0
 #: How far in one lip another lip may lie (mm), and how far apart they are set then.
 SLACK_MM, _APART_MM = 0.01, 0.005
 
@@ -130,46 +126,23 @@ def touch_rows(
     return rows
 
 
-class LipCollision:
-    """Finds where one lip lies in the other.
+def parting_rows(
+    crossings: LipCrossings, before_mm: np.ndarray, now_mm: np.ndarray
+) -> tuple[Rows, float]:
+    """(one-sided rows that part lips which pass through each other now, greatest depth in mm).
 
-    Attributes:
-        vertices: (K,) ids of the lips and their surroundings, ascending.
+    Args:
+        before_mm, now_mm: (V, 3); rows are for moves from before.
     """
-
-    def __init__(self, face: FaceModel, neutral_mm: np.ndarray):
-        lips = lips_of(face)
-        meeting = neutral_mm[face.inner_contour]
-        red = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
-
-        def near(ids: np.ndarray) -> np.ndarray:
-            distance = np.linalg.norm(neutral_mm[ids, None] - meeting, axis=2).min(axis=1)
-            return ids[red[ids] | (distance < _INSIDE_MM)]
-
-        upper, lower = near(lips.upper), near(lips.lower)
-        member = np.zeros(len(neutral_mm), dtype=bool)
-        member[upper] = member[lower] = True
-        triangles = face.triangles[member[face.triangles].any(axis=1)]
-        self.vertices = np.unique(triangles)
-        self._triangles = np.searchsorted(self.vertices, triangles)
-        self._lips = Lips(
-            np.searchsorted(self.vertices, upper), np.searchsorted(self.vertices, lower)
-        )
-
-    def rows(self, before_mm: np.ndarray, now_mm: np.ndarray) -> tuple[Rows, float]:
-        """(one-sided rows that part what lies inside now, greatest depth in mm).
-
-        Args:
-            before_mm, now_mm: (K, 3) of `vertices`; rows are for moves from before.
-        """
-        normals = vertex_normals(now_mm, self._triangles)
-        ids, near, depth = penetration(now_mm, normals, self._lips)
-        deep = depth > SLACK_MM
-        ids, near = ids[deep], near[deep]
-        directions = normals[near]
-        pairs = np.stack([ids, near], axis=1)
-        signs = np.tile([1.0, -1.0], (len(ids), 1))
-        wanted = _APART_MM - ((before_mm[ids] - before_mm[near]) * directions).sum(axis=1)
-        rows = Rows(self.vertices[pairs], signs, directions, wanted, np.full(len(ids), 1e-5),
-                    np.ones(len(ids), dtype=bool))  # fmt: skip
-        return rows, float(depth.max(initial=0.0))
+    found = crossings.find(now_mm)
+    deepest = found.deepest_mm
+    found = found[found.depth_mm > SLACK_MM]
+    rows = Rows(
+        np.concatenate([found.inside[:, None], found.triangle], axis=1),
+        np.concatenate([np.ones((len(found.inside), 1)), -found.barycentric], axis=1),
+        found.normal, np.zeros(len(found.inside)), np.full(len(found.inside), 1e-5),
+        np.ones(len(found.inside), dtype=bool),
+    )  # fmt: skip
+    # The plane's equation holds at any of its points, so it does at where the edge enters.
+    rows.wanted[:] = _APART_MM - rows.of_mesh(before_mm)
+    return rows, deepest

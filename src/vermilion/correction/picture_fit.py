@@ -10,7 +10,8 @@ import numpy as np
 
 from vermilion.correction.constraints import ConstraintSolver, Rows
 from vermilion.correction.integration import LayerIntegrator
-from vermilion.correction.lip_rows import LipCollision, LipSamples, contour_rows, touch_rows
+from vermilion.correction.lip_crossings import LipCrossings
+from vermilion.correction.lip_rows import LipSamples, contour_rows, parting_rows, touch_rows
 from vermilion.correction.picture import Picture, PictureSettings
 from vermilion.correction.repose import ANCHORS, moved, repose_motion, smoothed_motion
 from vermilion.correction.rotations import rotation_matrix
@@ -41,8 +42,8 @@ class PictureFit:
         self._eyes = face.landmarks[EYE_CORNERS]
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
-        self._collision = LipCollision(face, neutral_mm)
-        named = np.union1d(self._samples.vertices, self._collision.vertices)
+        self._crossings = LipCrossings(face)
+        named = np.union1d(self._samples.vertices, self._crossings.vertices)
         self._solver = ConstraintSolver(integrator, named)
 
     @classmethod
@@ -121,11 +122,11 @@ class PictureFit:
                 self._samples, vertices, picture.inner_px[f], lines[2][n:], unit_px,
                 view / np.linalg.norm(view), weight,
             )  # fmt: skip
-        ids = self._collision.vertices
+        ids, now = self._crossings.vertices, np.array(vertices)
         for _ in range(_ROUNDS):
             forces = self._solver.multipliers(rows)
-            now = vertices[ids] + self._solver.near_moves(rows, forces, ids)
-            parting, _ = self._collision.rows(vertices[ids], now)
+            now[ids] = vertices[ids] + self._solver.near_moves(rows, forces, ids)
+            parting, _ = parting_rows(self._crossings, vertices, now)
             if len(parting) == 0:
                 break
             rows += parting

@@ -1,15 +1,18 @@
-"""The gap between the lips, the same way for truth and result."""
+"""The gap between the lips, and how deep one lies in the other, the same way for truth and result."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.evaluation.masks import lip_labels
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import adjacency
 
 N_COLUMNS = 7
 _GROW_RINGS = 2
+#: Lips pass through each other where one lies deeper in the other (mm).
+THROUGH_MM = 0.05
 
 
 def lip_sides(model: FaceModel) -> np.ndarray:
@@ -66,3 +69,12 @@ def aperture_mm(gaps: np.ndarray) -> np.ndarray:
     count = finite.sum(axis=1)
     total = np.where(finite, gaps, 0.0).sum(axis=1)
     return np.divide(total, count, out=np.full(len(gaps), np.nan), where=count > 0)
+
+
+def lip_depths(sequence_mm: np.ndarray, model: FaceModel) -> np.ndarray:
+    """How deep one lip lies in the other, (F,) mm, of meshes (F, V, 3); 0 where neither does.
+
+    Away from the corners of the mouth, where the lips are one surface.
+    """
+    crossings = LipCrossings(model)
+    return np.array([crossings.find(vertices).deepest_mm for vertices in sequence_mm])

@@ -23,6 +23,7 @@ _RATIOS = (
     ("drift_mm", "drift", "drift_weight", "mm"),
     ("aperture_error_mm", "aperture", "aperture_frames", "mm"),
     ("false_open_rate", "false_open", "touch_frames", "1"),
+    ("lip_penetration_rate", "through", "through_frames", "1"),
     ("contour_error_px", "contour", "contour_frames", "px per px of inter-ocular distance"),
 )
 _QUANTILES = (("surface_error_median_mm", 0.5), ("surface_error_p95_mm", 0.95))

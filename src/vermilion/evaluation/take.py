@@ -16,12 +16,13 @@ from vermilion.evaluation.errors import (
     sums_of_aperture,
     sums_of_drift,
     sums_of_errors,
+    sums_of_frames,
     sums_of_jitter,
     surface_errors,
     vertex_errors,
 )
 from vermilion.evaluation.kind_errors import sums_of_kinds
-from vermilion.evaluation.lips import aperture_mm, columns_of, lip_sides
+from vermilion.evaluation.lips import THROUGH_MM, aperture_mm, columns_of, lip_depths, lip_sides
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
@@ -111,6 +112,7 @@ def evaluate_take(
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, touch_mm, gape_mm)
             + sums_of_kinds(errors[name], kinds, regions, clips)
+            + sums_of_frames("mouth.through", lip_depths(sequence, model) > THROUGH_MM, clips)
         )
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)

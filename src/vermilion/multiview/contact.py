@@ -110,15 +110,6 @@ def resolve_contact(
     raise AssertionError("unreachable")
 
 
-def penetration(
-    vertices_mm: np.ndarray, normals: np.ndarray, lips: Lips, reach_mm: float = 4.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices inside the other lip, the nearest vertices of that lip, and the depth in mm, all (n,)."""
-    sides = ((lips.upper, lips.lower), (lips.lower, lips.upper))
-    found = [_penetration(vertices_mm, normals, *side, reach_mm) for side in sides]
-    return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
-
-
 def _penetration(vertices, normals, mine, other, reach_mm):
     """(vertices inside the other lip, their nearest vertices there, depth in mm)."""
     distance, nearest = cKDTree(vertices[other]).query(

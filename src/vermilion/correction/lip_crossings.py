@@ -1,0 +1,105 @@
+"""Where one lip passes through the other: edges of one that enter triangles of the other.
+
+Exact for the meshes as they are, where the distance to the nearest vertex is only nearly so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.faces.model import FaceModel
+from vermilion.mesh import normalised, triangle_cross, unique_edges
+from vermilion.multiview.contact import lips_of
+from vermilion.raycast import RayCaster
+
+#: The inside of the mouth further than this from where the lips meet does not count (mm).
+_INSIDE_MM = 8.0
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Edges that enter the other lip.
+
+    Attributes:
+        inside: (n,) the vertex that lies inside.
+        triangle: (n, 3) corners of the triangle that the edge enters; barycentric: (n, 3) there.
+        normal: (n, 3) of that triangle, outwards.
+        depth_mm: (n,) of the vertex below the triangle's plane.
+    """
+
+    inside: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    normal: np.ndarray
+    depth_mm: np.ndarray
+
+    def __getitem__(self, chosen: np.ndarray) -> Crossings:
+        return Crossings(
+            self.inside[chosen], self.triangle[chosen], self.barycentric[chosen],
+            self.normal[chosen], self.depth_mm[chosen],
+        )  # fmt: skip
+
+    @property
+    def deepest_mm(self) -> float:
+        return float(self.depth_mm.max(initial=0.0))
+
+
+class LipCrossings:
+    """The two lips of a topology, without the corners of the mouth, where they are one surface.
+
+    Attributes:
+        vertices: (K,) ids that take part, ascending.
+    """
+
+    def __init__(self, face: FaceModel):
+        lips = lips_of(face)
+        red = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
+        meeting = face.neutral_mm[face.inner_contour]
+        sides = []
+        for ids in (lips.upper, lips.lower):
+            distance = np.linalg.norm(face.neutral_mm[ids, None] - meeting, axis=2).min(axis=1)
+            member = np.zeros(face.n_vertices, dtype=bool)
+            member[ids[red[ids] | (distance < _INSIDE_MM)]] = True
+            sides.append(face.triangles[member[face.triangles].all(axis=1)])
+        self._triangles = sides
+        self._edges = [_both_ways(side) for side in sides]
+        self.vertices = np.unique(np.concatenate([side.ravel() for side in sides]))
+
+    def find(self, vertices_mm: np.ndarray) -> Crossings:
+        """Crossings of a mesh (V, 3); only rows `vertices` need be right."""
+        upper, lower = (
+            _entering(vertices_mm, self._edges[mine], self._triangles[1 - mine]) for mine in (0, 1)
+        )
+        names = ("inside", "triangle", "barycentric", "normal", "depth_mm")
+        return Crossings(*(np.concatenate([getattr(upper, n), getattr(lower, n)]) for n in names))
+
+
+def _both_ways(triangles: np.ndarray) -> np.ndarray:
+    edges = unique_edges(triangles) if len(triangles) else np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate([edges, edges[:, ::-1]])
+
+
+def _entering(vertices: np.ndarray, edges: np.ndarray, triangles: np.ndarray) -> Crossings:
+    """Edges (E, 2) from outside through the front of a triangle (T, 3)."""
+    if len(edges) == 0 or len(triangles) == 0:
+        nothing = np.zeros(0, dtype=np.int64)
+        return Crossings(nothing, *(np.zeros((0, 3), t) for t in (np.int64, float, float)), nothing)
+    # Around their own middle, as the ray caster has single precision.
+    middle = vertices[edges[:, 0]].mean(axis=0)
+    local = vertices - middle
+    along = local[edges[:, 1]] - local[edges[:, 0]]
+    length = np.linalg.norm(along, axis=1)
+    hits = RayCaster(local, triangles).cast(
+        local[edges[:, 0]], along / np.maximum(length, 1e-9)[:, None]
+    )
+    met = hits.hit & (hits.distance_mm < length)
+    corners = triangles[hits.triangle[met]]
+    normal = normalised(triangle_cross(local, corners))
+    along, ends = along[met], edges[met, 1]
+    depth = -((local[ends] - local[corners[:, 0]]) * normal).sum(axis=1)
+    enters = ((along * normal).sum(axis=1) < 0) & (depth > 0)
+    return Crossings(
+        ends, corners, hits.barycentric[met].astype(float), normal, depth,
+    )[enters]  # fmt: skip
