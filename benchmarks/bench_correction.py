@@ -26,12 +26,19 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
+from vermilion.camera import look_at, pinhole
 from vermilion.correction.apply import Corrector
 from vermilion.correction.domain import mesh_corners
 from vermilion.correction.layers import decode_layers
+from vermilion.correction.picture import Picture
+from vermilion.correction.picture_fit import PictureFit
 from vermilion.correction.right_side import LANES, TURN_SERIES, accumulate_mixture, turn_limits
 from vermilion.correspondence.correspondence import topology_hash
+from vermilion.faces.contours import closed_loop, edge_graph
+from vermilion.faces.model import REGIONS, FaceModel
+from vermilion.features.rings import lip_rings
 from vermilion.regression.estimators import RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import layer_basis
@@ -158,6 +165,8 @@ def main() -> None:
     for kind in SPECTRA:
         model = fitted_model(kind, triangles, mask, arguments.basis_error)
         report(kind, Corrector(model, vertices, triangles, detail_mm=10.0), coarse, features)
+    corrector = Corrector(model, vertices, triangles, detail_mm=10.0)
+    report_picture(corrector, vertices, coarse, features, triangles)
     corrector = Corrector(model, vertices, triangles)  # the peer knows no displacements
     other = peer(corrector, coarse, features, triangles)
     difference = np.abs(other() - corrector.correct(coarse[:8], features[:8])).max()
@@ -186,6 +195,67 @@ def report(kind: str, corrector: Corrector, coarse: np.ndarray, features: np.nda
     print(f"  copy of the vertices          {ms['copy']:8.2f}")
     print(f"bare solves of the same system  {ms['solves']:8.2f}, {LANES} frames together")
     print(f"whole over bare solves          {ms['whole'] / ms['solves']:8.2f} (bar 2.5)")
+
+
+def mouth_on(vertices: np.ndarray, triangles: np.ndarray) -> FaceModel:
+    """A closed mouth drawn on the sheet: contours, lips and eyes where a face has them."""
+    graph = edge_graph(vertices, triangles)
+    x, y = vertices[:, 0], vertices[:, 1]
+
+    def nearest(points: np.ndarray) -> np.ndarray:
+        return cKDTree(vertices[:, :2]).query(points)[1]
+
+    angle = np.pi - np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    loops = [
+        closed_loop(graph, nearest(np.stack([26 * np.cos(angle), h * np.sin(angle)], axis=1)))
+        for h in (11.0, 2.5)
+    ]
+    landmarks = nearest(np.random.default_rng(4).uniform(-60, 60, (66, 2)))
+    landmarks[[58, 62, 36, 45]] = nearest(np.array([[-26, 0], [26, 0], [-44, 70], [44, 70]]))
+    regions = {name: np.zeros(len(vertices), dtype=bool) for name in REGIONS}
+    lips = (x / 26) ** 2 + (y / 11) ** 2 < 1
+    regions["vermilion_upper"], regions["vermilion_lower"] = lips & (y > 0), lips & (y <= 0)
+    nothing = np.zeros((0, len(vertices), 3), np.float32)
+    uv = np.zeros((len(vertices), 2), np.float32)
+    return FaceModel(
+        "sheet", vertices, triangles, (), nothing, nothing, uv, landmarks, *loops, regions
+    )
+
+
+def report_picture(
+    corrector: Corrector, vertices: np.ndarray, coarse: np.ndarray, features: np.ndarray, triangles
+) -> None:
+    """Print the figures of the correction with pose, contours and contact."""
+    face = mouth_on(vertices, triangles)
+    camera = pinhole(
+        "cam",
+        1500.0,
+        1280,
+        720,
+        look_at(np.array([0, 0, 700.0]), np.zeros(3), np.array([0, 1.0, 0])),
+    )
+    pose = np.tile(np.eye(3), (N_FRAMES, 1, 1)), np.zeros((N_FRAMES, 3))
+    rng = np.random.default_rng(5)
+    found = [
+        camera.project(ring.points(coarse)) + rng.normal(scale=0.5, size=(N_FRAMES, 80, 2))
+        for ring in lip_rings(face, 80)
+    ]
+    known = np.ones((N_FRAMES, 80), dtype=bool)
+    picture = Picture(face, camera, np.arange(N_FRAMES), *found, known, known)
+    fit = PictureFit.of(corrector.integrator, vertices, picture)
+    ms = best_ms(
+        {
+            "whole": (
+                lambda: fit.fit(corrector.correct(coarse, features), coarse, *pose, picture),
+                N_FRAMES,
+            ),
+            "base": (lambda: corrector.correct(coarse, features), N_FRAMES),
+        },
+        rounds=4,
+    )
+    print("\nwith the picture: pose, 160 contour points, contact (nothing touches)")
+    print(f"features to vertices            {ms['whole']:8.2f} ms a frame (bar 15)")
+    print(f"  without the picture           {ms['base']:8.2f}")
 
 
 def right_sides(corrector: Corrector) -> Callable:

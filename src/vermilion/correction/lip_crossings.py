@@ -5,7 +5,7 @@ Exact for the meshes as they are, where the distance to the nearest vertex is on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -63,17 +63,21 @@ class LipCrossings:
             member = np.zeros(face.n_vertices, dtype=bool)
             member[ids[red[ids] | (distance < _INSIDE_MM)]] = True
             sides.append(face.triangles[member[face.triangles].all(axis=1)])
-        self._triangles = sides
-        self._edges = [_both_ways(side) for side in sides]
         self.vertices = np.unique(np.concatenate([side.ravel() for side in sides]))
+        self._triangles = [np.searchsorted(self.vertices, side) for side in sides]
+        self._edges = [_both_ways(side) for side in self._triangles]
 
     def find(self, vertices_mm: np.ndarray) -> Crossings:
         """Crossings of a mesh (V, 3); only rows `vertices` need be right."""
+        lips = vertices_mm[self.vertices]
+        lips = lips - lips.mean(axis=0)  # the ray caster has single precision
         upper, lower = (
-            _entering(vertices_mm, self._edges[mine], self._triangles[1 - mine]) for mine in (0, 1)
+            _entering(lips, self._edges[mine], self._triangles[1 - mine]) for mine in (0, 1)
         )
-        names = ("inside", "triangle", "barycentric", "normal", "depth_mm")
-        return Crossings(*(np.concatenate([getattr(upper, n), getattr(lower, n)]) for n in names))
+        inside, triangle, *others = (
+            np.concatenate([getattr(upper, f.name), getattr(lower, f.name)]) for f in fields(upper)
+        )
+        return Crossings(self.vertices[inside], self.vertices[triangle], *others)
 
 
 def _both_ways(triangles: np.ndarray) -> np.ndarray:
@@ -86,19 +90,15 @@ def _entering(vertices: np.ndarray, edges: np.ndarray, triangles: np.ndarray) ->
     if len(edges) == 0 or len(triangles) == 0:
         nothing = np.zeros(0, dtype=np.int64)
         return Crossings(nothing, *(np.zeros((0, 3), t) for t in (np.int64, float, float)), nothing)
-    # Around their own middle, as the ray caster has single precision.
-    middle = vertices[edges[:, 0]].mean(axis=0)
-    local = vertices - middle
-    along = local[edges[:, 1]] - local[edges[:, 0]]
+    along = vertices[edges[:, 1]] - vertices[edges[:, 0]]
     length = np.linalg.norm(along, axis=1)
-    hits = RayCaster(local, triangles).cast(
-        local[edges[:, 0]], along / np.maximum(length, 1e-9)[:, None]
-    )
+    directions = along / np.maximum(length, 1e-9)[:, None]
+    hits = RayCaster(vertices, triangles).cast(vertices[edges[:, 0]], directions)
     met = hits.hit & (hits.distance_mm < length)
     corners = triangles[hits.triangle[met]]
-    normal = normalised(triangle_cross(local, corners))
+    normal = normalised(triangle_cross(vertices, corners))
     along, ends = along[met], edges[met, 1]
-    depth = -((local[ends] - local[corners[:, 0]]) * normal).sum(axis=1)
+    depth = -((vertices[ends] - vertices[corners[:, 0]]) * normal).sum(axis=1)
     enters = ((along * normal).sum(axis=1) < 0) & (depth > 0)
     return Crossings(
         ends, corners, hits.barycentric[met].astype(float), normal, depth,
