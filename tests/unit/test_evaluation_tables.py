@@ -44,7 +44,7 @@ def test_every_person_has_their_own_ps_in_the_pool():
 
 def test_takes_of_several_roles_are_also_joined_by_role():
     assert groups_of(["video", "video"]) == {"all": [0, 1]}
-    assert groups_of(["tattoo", "video"]) == {"all": [0, 1], "tattoo": [0], "video": [1]}
+    assert groups_of(["tattoo", "video", "tattoo"]) == {"all": [0, 1, 2], "tattoo": [0, 2]}
 
 
 def test_seconds_of_all_takes_are_the_mean_over_frames():

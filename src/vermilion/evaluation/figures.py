@@ -90,7 +90,8 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
         for row in rows.itertuples():
             axis.barh(y, row.mean_mm, 0.72, color=colour_of(row.regressor))
             if np.isfinite(row.low_mm):
-                axis.plot([row.low_mm, row.high_mm], [y, y], color=_INK, lw=1.1)
+                for colour, width in (("white", 2.4), (_INK, 1.1)):
+                    axis.plot([row.low_mm, row.high_mm], [y, y], color=colour, lw=width)
             ratio = "" if row.regressor == "base" else f"  ({row.ratio_to_base:.2f} of base)"
             text = f"{row.mean_mm:.2f} ± {row.std_mm:.2f} mm{ratio}"
             edge = max(row.mean_mm, row.high_mm if np.isfinite(row.high_mm) else 0.0)

@@ -17,10 +17,10 @@ TOGETHER = "all"
 
 
 def groups_of(roles: Sequence[str]) -> dict[str, list[int]]:
-    """Name of a group of takes -> which of them: `all`, and a role each where there are several."""
+    """Name of a group of takes -> which of them: `all`, and each role that several but not all have."""
     groups = {TOGETHER: list(range(len(roles)))}
-    if len(set(roles)) > 1:
-        for role in dict.fromkeys(roles):
+    for role in dict.fromkeys(roles):
+        if 1 < roles.count(role) < len(roles):
             groups[role] = [index for index, other in enumerate(roles) if other == role]
     return groups
 
