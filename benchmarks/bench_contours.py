@@ -100,9 +100,9 @@ def contour_error_px(detector, frame: LabelledFrame) -> tuple[dict[str, float], 
     inner = find_inner(inner_map, outer.points, model_inner, unit, settings)
     scale = 120.0 / np.ptp(frame.label.outer.points_px[:, 0])
     ends = frame.label.inner.points_px[:, 0]
-    between = (inner.points_px[:, 0] > ends.min()) & (inner.points_px[:, 0] < ends.max())
+    between = (inner.points[:, 0] > ends.min()) & (inner.points[:, 0] < ends.max())
     errors = {}
-    for name, points in (("outer", outer.points_px), ("inner", inner.points_px[between])):
+    for name, points in (("outer", outer.points), ("inner", inner.points[between])):
         line = getattr(frame.label, name).dense(0.2)
         errors[name] = float(cKDTree(line).query(points)[0].mean() * scale)
     return errors, seconds

@@ -150,10 +150,10 @@ def test_the_unlabelled_frame_has_its_true_distances(take):
     table = FeatureTable.load(root / "000000-000004/features.npz")
     value = dict(zip(table.names, table.features[3], strict=True))
     tolerance = 2.0 / 200  # 2 px
-    assert value["outer_width"] == pytest.approx(104 / 200, abs=2 * tolerance)
-    assert value["outer_height_5"] == pytest.approx(52 / 200, abs=tolerance)
-    assert value["upper_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
-    assert value["lower_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
+    assert value["head_outer_width"] == pytest.approx(104 / 200, abs=2 * tolerance)
+    assert value["head_outer_height_5"] == pytest.approx(52 / 200, abs=tolerance)
+    assert value["head_upper_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
+    assert value["head_lower_lip_5"] == pytest.approx(17 / 200, abs=tolerance)
 
 
 def test_a_frame_that_cannot_be_read_is_flagged_and_the_others_go_on(take):

@@ -2,7 +2,8 @@
 
 The spline through each loop is moved to the border of the lips' colour, as one smooth ring near
 the landmarks, and a ridge is drawn about it. What is lip-coloured is learnt in each frame by
-itself, from the band between the loops.
+itself, from the band between the loops; then again between the borders that were found, where shade
+and gloss are the lips' own and not those of a landmark that missed.
 """
 
 from __future__ import annotations
@@ -18,9 +19,40 @@ from scipy.spatial import cKDTree
 from vermilion.contours.channels import image_channels
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.paths import cheapest_ring
-from vermilion.contours.region import MouthRegion
+from vermilion.contours.region import SIDE, MouthRegion
 
 STEP_PX = 0.5  # between the places along a normal, region pixels
+BLUR_PX = 1.0  # of the colours
+LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade above it allows
+CONTACT = 0.04  # a mouth open by less may be closed: per inter-ocular distance
+LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
+LINE_SHARE = 0.7  # what the dark line counts there, against the fall
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One search for the borders.
+
+    Attributes:
+        band: where lips are sure to be, from the outer (0) to the inner (1) border.
+        tolerance: squared deviations from the lips' colour at which a colour is 63 % strange.
+        inner_reach: of the search for the inner border, per that for the outer one. A whole reach
+            starts at the landmarks, a part at the border found before.
+    """
+
+    band: tuple[float, float]
+    tolerance: float
+    inner_reach: float
+
+
+#: First the middle of the lips, as landmarks may miss. Then all up to the dark of the opening, but
+#: strictly, as gums and tongue are nearly lip-coloured. Last leniently, so that the lips' own shade
+#: beside the opening does not count as opening, close to the border that is known by then.
+PASSES = (
+    Pass((0.3, 0.7), 18.0, 1.0),
+    Pass((0.5, 0.95), 18.0, 1.0),
+    Pass((0.5, 0.95), 50.0, 0.3),
+)
 
 
 @dataclass(frozen=True)
@@ -45,27 +77,41 @@ class LandmarkRidgeDetector(ContourDetector):
 
     def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
-        planes = lip_planes(image_channels(picture)[:3], region)
-        loops = {"inner": region.inner_px, "outer": region.outer_px}
-        maps = {}
-        for name, loop in loops.items():
-            curve = loop_spline(loop)
-            reach = self.reach * self.interocular_size_px * (1.0 if name == "outer" else 0.6)
-            curve, strength = self._moved(curve, planes[name], reach)
-            maps[name] = self._ridge(curve, strength, region)
-        return maps
+        colours = image_channels(picture)[:3]
+        colours = np.stack([cv2.GaussianBlur(plane, (0, 0), BLUR_PX) for plane in colours])
+        landmarks = {"inner": loop_spline(region.inner_px), "outer": loop_spline(region.outer_px)}
+        reach = self.reach * self.interocular_size_px
+        contact = dark_lines(colours[0])
+        curves, strengths = dict(landmarks), {}
+        for once in PASSES:
+            planes = lip_planes(colours, curves, once)
+            inner = curves["inner"] if once.inner_reach < 1 else landmarks["inner"]
+            for name, start, share in (
+                ("outer", curves["outer"], 1.0),
+                ("inner", inner, once.inner_reach),
+            ):
+                curves[name], strengths[name] = self._moved(
+                    start, planes[name], share * reach, contact if name == "inner" else None
+                )
+        return {name: self._ridge(curves[name], strengths[name], region) for name in curves}
 
     def _moved(
-        self, curve: np.ndarray, plane: np.ndarray, reach_px: float
+        self, curve: np.ndarray, plane: np.ndarray, reach_px: float, contact: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The curve on the strongest fall of `plane` near it, and the fall (n,) in [0, 1]."""
+        """The curve on the strongest fall of `plane` near it, and the fall (n,) in [0, 1].
+
+        Where the curve's halves nearly meet, lips may touch: their line of `contact` counts too.
+        """
         normals = _outward_normals(curve)
         places = np.arange(-reach_px, reach_px + 1e-9, STEP_PX)
         points = curve[:, None] + places[None, :, None] * normals[:, None]
-        x, y = (np.ascontiguousarray(points[..., k] - 0.5, dtype=np.float32) for k in range(2))
-        profile = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        fall = np.maximum(-np.gradient(profile.astype(np.float64), STEP_PX, axis=1), 0.0)
+        fall = np.maximum(-np.gradient(_sampled(plane, points), STEP_PX, axis=1), 0.0)
         fall = np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
+        if contact is not None:
+            near = np.exp(-((_gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))
+            line = _sampled(contact, points)
+            line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
+            fall += LINE_SHARE * near[:, None] * (line - fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
         apart = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
         chosen = cheapest_ring(cost, self.stiffness * (STEP_PX / np.maximum(apart, STEP_PX)) ** 2)
@@ -101,34 +147,37 @@ class LandmarkRidgeDetector(ContourDetector):
         return cls(**{name: float(arrays[name]) for name in names})
 
 
-def lip_planes(lab: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+def lip_planes(
+    colours: np.ndarray, curves: dict[str, np.ndarray], once: Pass
+) -> dict[str, np.ndarray]:
     """Two (size, size) float32 planes in [0, 1] that fall outwards across each contour.
 
     `outer`: probability of lip against skin, of two normal distributions with one covariance
-    (linear discriminant) in the colour channels `lab` (3, size, size). `inner`: how far the colour
-    is from the lips', which is high in the mouth's opening, on teeth and on the dark line of a
-    closed mouth.
+    (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
+    the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
+    What is lip, the `curves` (n, 2) of both contours and the band of the pass say.
     """
-    smooth = np.stack([cv2.GaussianBlur(plane, (0, 0), 1.2) for plane in lab])
-    inside, to_outer = _drawn(region.outer_px, region.size_px)
-    opening, to_inner = _drawn(region.inner_px, region.size_px)
+    size = colours.shape[1]
+    inside, to_outer = _drawn(curves["outer"], size)
+    opening, to_inner = _drawn(curves["inner"], size)
     ratio = to_outer / np.maximum(to_outer + to_inner, 1e-9)
-    lip = inside & ~opening & (ratio > 0.3) & (ratio < 0.7)
-    scale = region.size_px / 1.1
+    lip = inside & ~opening & (ratio > once.band[0]) & (ratio < once.band[1])
+    scale = size / SIDE
     skin = ~inside & (to_outer > 0.05 * scale) & (to_outer < 0.12 * scale)
     if lip.sum() < 20 or skin.sum() < 20:
-        return {"inner": np.zeros_like(lab[0]), "outer": np.zeros_like(lab[0])}
-    lips, skins = smooth[:, lip].T.astype(np.float64), smooth[:, skin].T.astype(np.float64)
+        return {name: np.zeros_like(colours[0]) for name in ("inner", "outer")}
+    lips, skins = colours[:, lip].T.astype(np.float64), colours[:, skin].T.astype(np.float64)
     own = _covariance(lips)
     shared = 0.5 * (own + _covariance(skins))
+    spread = own + LEAST_SPREAD**2 * np.eye(3)
     direction = np.linalg.solve(shared, lips.mean(axis=0) - skins.mean(axis=0))
     middle = 0.5 * (lips.mean(axis=0) + skins.mean(axis=0))
-    log_odds = np.tensordot(direction, smooth - middle[:, None, None], axes=1)
-    away = smooth.reshape(3, -1).T - lips.mean(axis=0)
-    squared = np.einsum("nk,kl,nl->n", away, np.linalg.inv(own), away).reshape(lab.shape[1:])
+    log_odds = np.tensordot(direction, colours - middle[:, None, None], axes=1)
+    away = colours.reshape(3, -1).T - lips.mean(axis=0)
+    squared = np.einsum("nk,kl,nl->n", away, np.linalg.inv(spread), away).reshape(size, size)
     return {
         "outer": (1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))).astype(np.float32),
-        "inner": (1.0 - np.exp(-squared / 18.0)).astype(np.float32),
+        "inner": (1.0 - np.exp(-squared / once.tolerance)).astype(np.float32),
     }
 
 
@@ -148,6 +197,28 @@ def loop_spline(loop_px: np.ndarray, n_points: int = 240) -> np.ndarray:
     return np.concatenate(halves)
 
 
+def dark_lines(lightness: np.ndarray) -> np.ndarray:
+    """How much darker a place (size, size) is than what lies beside it; zero where it is not."""
+    blurred = ((scale, cv2.GaussianBlur(lightness, (0, 0), scale)) for scale in LINE_PX)
+    found = [scale**2 * cv2.Laplacian(plane, cv2.CV_32F) for scale, plane in blurred]
+    return np.maximum(np.maximum(*found), 0.0)
+
+
+def _gap(curve: np.ndarray) -> np.ndarray:
+    """Distance (n,) of each point of a closed curve to the half that it does not belong to."""
+    half = len(curve) // 2
+    parts = curve[: half + 1], np.concatenate([curve[half:], curve[:1]])
+    away = [cKDTree(other).query(part)[0] for part, other in (parts, parts[::-1])]
+    return np.concatenate([part[:-1] for part in away])
+
+
+def _sampled(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Bilinear values (n, m) of a plane (h, w) at points (n, m, 2)."""
+    x, y = (np.ascontiguousarray(points[..., k] - 0.5, dtype=np.float32) for k in range(2))
+    found = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return found.astype(np.float64)
+
+
 def _outward_normals(curve: np.ndarray) -> np.ndarray:
     tangent = np.roll(curve, -4, axis=0) - np.roll(curve, 4, axis=0)
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
@@ -157,9 +228,9 @@ def _outward_normals(curve: np.ndarray) -> np.ndarray:
     return normal if area > 0 else -normal
 
 
-def _drawn(loop_px: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Inside of a loop (size, size) bool, and the distance to it to a pixel."""
-    points = [np.rint(loop_spline(loop_px) - 0.5).astype(np.int32)]
+def _drawn(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Inside of a closed curve (size, size) bool, and the distance to it to a pixel."""
+    points = [np.rint(curve - 0.5).astype(np.int32)]
     inside, away = np.zeros((size, size), dtype=np.uint8), np.ones((size, size), dtype=np.uint8)
     cv2.fillPoly(inside, points, 1)
     cv2.polylines(away, points, True, 0)
