@@ -113,3 +113,59 @@ rule apply_export:
         fps=lambda wildcards: take_of(wildcards).fps,
     script:
         "../scripts/apply_export.py"
+
+
+rule makeup:
+    """Draws virtual make-up and a checkerboard on the corrected face (Mono13 9)."""
+    input:
+        unpack(mono_inputs),
+        tracker=tracker_of,
+        identity=R + "/subjects/{subject}/identity.npz",
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        appearance=R + "/takes/{subject}/{take}/tracking/appearance.npz",
+        corrected=APPLIED + "/chunks/{chunk}.npy",
+    output:
+        video=APPLIED + "/makeup/{chunk}.mp4",
+        picture=APPLIED + "/makeup/{chunk}.png",
+    log:
+        R + "/logs/makeup/{subject}-{take}-{chunk}.log",
+    benchmark:
+        R + "/benchmarks/makeup/{subject}-{take}-{chunk}.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of("apply.makeup", "apply.overlay"),
+        code=code_of("makeup"),
+        frames=lambda wildcards: frames_in(wildcards.chunk),
+        fps=lambda wildcards: take_of(wildcards).fps,
+        source=mono_source,
+    script:
+        "../scripts/makeup.py"
+
+
+rule makeup_join:
+    """Joins the make-up of a take: makeup.mp4, and a picture of its first chunk."""
+    input:
+        videos=per_chunk(APPLIED + "/makeup/{chunk}.mp4"),
+        pictures=per_chunk(APPLIED + "/makeup/{chunk}.png"),
+    output:
+        video=report(
+            APPLIED + "/makeup.mp4",
+            category="Corrected takes",
+            labels={"take": "{subject}/{take}, make-up"},
+            caption="../report/makeup.rst",
+        ),
+        picture=APPLIED + "/makeup.png",
+    log:
+        R + "/logs/makeup_join/{subject}-{take}.log",
+    benchmark:
+        R + "/benchmarks/makeup_join/{subject}-{take}.tsv"
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime=20,
+    params:
+        code=code_of("makeup_join"),
+    script:
+        "../scripts/makeup_join.py"

@@ -95,6 +95,11 @@ def all_outputs():
             for name in applied_takes()
             for path in expand_chunks(APPLIED + "/chunks/{chunk}.npy", *name.split("/"))
         ],
+        *[
+            f"{R}/apply/{name}/makeup.mp4"
+            for name in applied_takes()
+            if CONFIG.apply.makeup.enabled
+        ],
         *([R + "/evaluation/ablations.tsv"] if refinement_steps() else []),
         R + "/quality.tsv",
         R + "/evaluation/summary.html",

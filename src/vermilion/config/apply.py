@@ -6,6 +6,8 @@ from pydantic import Field
 
 from vermilion.config.base import StageConfig
 
+HEX = r"^#[0-9a-fA-F]{6}$"
+
 
 class ExportConfig(StageConfig):
     """Files that other programs open."""
@@ -33,6 +35,23 @@ class OverlayConfig(StageConfig):
     opacity: float = Field(0.85, ge=0.0, le=1.0, description="Opacity of the mesh (0 to 1).")
 
 
+class MakeUpConfig(StageConfig):
+    """Virtual make-up on the corrected take, lit with the estimated lighting (Mono13 9)."""
+
+    enabled: bool = Field(
+        False, description="Write `makeup.mp4` and `makeup.png`: original, make-up, checkerboard."
+    )
+    lipstick: str = Field("#9e0b2c", pattern=HEX, description="Colour of the lips (sRGB).")
+    lipstick_opacity: float = Field(0.8, ge=0, le=1, description="Opacity on the lips (0 to 1).")
+    eye_shadow: str = Field("#3d2a6b", pattern=HEX, description="Colour of the lids (sRGB).")
+    eye_shadow_opacity: float = Field(0.7, ge=0, le=1, description="Opacity on the lids (0 to 1).")
+    star: str = Field("#e0a92e", pattern=HEX, description="Colour of the star drawn on the cheek.")
+    star_opacity: float = Field(0.85, ge=0, le=1, description="Opacity of the star (0: none).")
+    checker_mm: float = Field(
+        8.0, gt=0.5, le=100, description="Side of a square of the checkerboard (mm)."
+    )
+
+
 class ApplyConfig(StageConfig):
     """Correction of ordinary video by a trained regressor (Lips16 section 6)."""
 
@@ -50,3 +69,4 @@ class ApplyConfig(StageConfig):
         default_factory=ExportConfig, description="Files that other programs open."
     )
     overlay: OverlayConfig = Field(default_factory=OverlayConfig, description="The overlay video.")
+    makeup: MakeUpConfig = Field(default_factory=MakeUpConfig, description="Virtual make-up.")
