@@ -12,8 +12,8 @@ MODEL = dome()
 
 
 def with_lips():
-    """The dome with lips: an octagon of 15 mm in its middle."""
-    turn = np.arange(8) * np.pi / 4
+    """The dome with lips: a circle of 15 mm in its middle."""
+    turn = np.arange(32) * np.pi / 16
     wanted = 15 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     away = np.linalg.norm(MODEL.neutral_mm[:, None, :2] - wanted, axis=2)
     return replace(MODEL, outer_contour=away.argmin(axis=0).astype(np.int32))
@@ -24,10 +24,12 @@ def test_hex_colours_are_linear_light():
     assert colour_of_hex("#808080") == pytest.approx([0.2159] * 3, abs=1e-3)
 
 
-def test_outline_is_zero_on_the_contour_and_positive_inside():
+def test_outline_lies_along_the_contour_and_is_positive_inside():
     model = with_lips()
     inside = lip_outline(model, model.neutral_mm)
-    assert np.abs(inside[model.outer_contour]).max() < 1e-6
+    assert (
+        np.abs(inside[model.outer_contour]).max() < 2.5
+    )  # mm: half an edge, and what smoothing cuts
     radius = np.linalg.norm(model.neutral_mm[:, :2], axis=1)
     assert (inside[radius < 10] > 0).all() and (inside[radius > 18] < 0).all()
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
@@ -16,6 +17,7 @@ from vermilion.mesh import normalised, vertex_normals
 from vermilion.photometric.harmonics import irradiance
 from vermilion.raycast import RayCaster, interpolate
 
+_SMOOTH = 1.5  # vertices of the contour
 _LUMA = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -92,7 +94,9 @@ def star(
 
 def lip_outline(model: FaceModel, neutral_mm: np.ndarray) -> np.ndarray:
     """How far (V,) mm inside the lips' outer contour the vertices lie, seen from the front."""
-    loop = np.ascontiguousarray(neutral_mm[model.outer_contour, :2], dtype=np.float32)
+    # The loop runs along edges of the mesh, in steps that no lipstick has.
+    loop = gaussian_filter1d(neutral_mm[model.outer_contour, :2], _SMOOTH, axis=0, mode="wrap")
+    loop = loop.astype(np.float32)
     points = [(float(x), float(y)) for x, y in neutral_mm[:, :2]]
     signed = np.array([cv2.pointPolygonTest(loop, point, True) for point in points])
     return np.where(neutral_mm[:, 2] > 0, signed, -np.abs(signed))
