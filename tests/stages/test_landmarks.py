@@ -126,3 +126,90 @@ def test_views_hold_the_cameras_that_see_a_face(stage):
     assert list(views.cameras) == ["cam"]
     error = np.linalg.norm(views.points_px[0] - truth[0], axis=-1).mean()
     assert error < 0.05 * face_size_px(truth[0])
+
+
+@pytest.fixture(scope="module")
+def moving(stage, tmp_path_factory):
+    """A take whose face moves by two pixels a frame, frame 2 damaged, detected landmarks noisy."""
+    root = tmp_path_factory.mktemp("moving")
+    rng = np.random.default_rng(9)
+    picture, points = drawn_face(rng)
+    for frame in range(N_FRAMES):
+        path = root / "take" / "frames" / "cam" / f"{frame:06d}.png"
+        write_image(path, np.roll(picture, 2 * frame, axis=1))
+    damaged = root / "take" / "frames" / "cam" / "000002.png"
+    damaged.write_bytes(damaged.read_bytes()[:400])
+    truth = points + 2.0 * np.arange(N_FRAMES)[:, None, None] * [1, 0]
+    valid = np.arange(N_FRAMES) != 2
+    noisy = np.where(valid[:, None, None], truth + rng.normal(size=truth.shape), np.nan)
+    confidence = np.full(truth.shape[:2], 0.9) * valid[:, None]
+    LandmarkTrack(np.arange(N_FRAMES), noisy, confidence, valid).save(root / "raw.npz")
+    label = root / "labels" / "cam" / "000000.json"
+    label.parent.mkdir(parents=True)
+    label.write_text(json.dumps({"unit": "px", "points": truth[0].tolist()}))
+    return root, truth, label
+
+
+def key_frames_of(root, **inputs):
+    """Run the stage; the table of key frames."""
+    run_script(
+        "landmarks_key_frames",
+        wildcards={"subject": "a", "take": "t"},
+        params={
+            "cfg": {"landmarks.key_frames": section()["key_frames"]},
+            "source": str(root / "take"),
+            "camera": "cam",
+        },
+        input={"landmarks": [root / "raw.npz"], "labels": [], "csv": []} | inputs,
+        output={"key_frames": root / "keys.npz", "table": root / "keys.tsv"},
+    )
+    return read_table(root / "keys.tsv", ["frame", "key_frame", "region_distance"])
+
+
+def corrected_of(root, frames):
+    run_script(
+        "landmarks_corrected",
+        wildcards={"subject": "a", "take": "t"},
+        params={
+            "cfg": {"landmarks.correction": section()["correction"] | {"face_px": 100.0}},
+            "source": str(root / "take"),
+            "camera": "cam",
+            "frames": frames,
+        },
+        input={"landmarks": [root / "raw.npz"], "key_frames": root / "keys.npz"},
+        output={
+            "landmarks": root / "out.npz",
+            "quality": root / "out.tsv",
+            "overlay": root / "out.png",
+        },
+    )
+    return LandmarkTrack.load(root / "out.npz"), read_table(root / "out.tsv")
+
+
+def test_a_frame_marked_by_hand_is_the_key_frame_and_flow_carries_it_on(moving):
+    root, truth, label = moving
+    table = key_frames_of(root, labels=[label])
+    assert table["key_frame"].tolist()[0] == "given"
+    assert np.isnan(table["region_distance"][2])  # the damaged frame
+    whole, quality = corrected_of(root, list(range(N_FRAMES)))
+    assert np.array_equal(whole.points_px[0], truth[0])
+    raw = LandmarkTrack.load(root / "raw.npz")
+    before = np.linalg.norm(raw.points_px - truth, axis=-1)[3, 17:].mean()
+    assert np.linalg.norm(whole.points_px - truth, axis=-1)[3, 17:].mean() < 0.7 * before
+    assert list(quality["valid"]) == [1, 1, 0, 1] and quality["reason"][2]
+    parts = [corrected_of(root, frames)[0] for frames in ([0, 1], [2, 3])]
+    points = np.concatenate([part.points_px for part in parts])
+    assert np.array_equal(points, whole.points_px, equal_nan=True)
+    assert read_image(root / "out.png").shape[0] > 100
+
+
+def test_landmarks_of_openface_are_key_frames(moving):
+    root, truth, _ = moving
+    extra = np.concatenate([truth, truth[:, :2]], axis=1)  # 68 points
+    header = ["frame", "confidence", "success"]
+    header += [f"{axis}_{k}" for axis in "xy" for k in range(68)]
+    rows = [[f + 1, 0.98, int(f != 1), *(extra[f].T.reshape(-1) - 0.5)] for f in (0, 1, 3)]
+    path = root / "openface.csv"
+    path.write_text("\n".join(", ".join(map(str, row)) for row in [header, *rows]))
+    kinds = key_frames_of(root, csv=[path])["key_frame"].fillna("")
+    assert [frame for frame, kind in enumerate(kinds) if kind == "given"] == [0, 3]

@@ -76,6 +76,15 @@ def test_feather_width(finished):
     assert set(jobs) == AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 
 
+def test_landmarks_corrected_by_flow(finished):
+    def change(content):
+        content["landmarks"]["correction"] = {"mode": "flow"}
+
+    with configured(finished, change):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_INPAINT | {"landmarks_key_frames", "landmarks_corrected"}
+
+
 def test_contour_label(finished):
     labels = sorted((finished.folder / "captures" / TAKE / "labels" / "contours").rglob("*.json"))
     text = labels[0].read_bytes()

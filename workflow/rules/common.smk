@@ -155,6 +155,24 @@ def tracker_of(wildcards):
     return f"{R}/face/tracker.npz"
 
 
+def mono_pictures(wildcards):
+    """Checked manifests of all chunks of a take, and its inpainted frames if it has a tattoo."""
+    folder = R + "/takes/{subject}/{take}"
+    name = (wildcards.subject, wildcards.take)
+    inputs = expand_chunks(folder + "/capture/{chunk}.json", *name)
+    if take_of(wildcards).role == "tattoo":
+        inputs += expand_chunks(folder + "/inpaint/{chunk}", *name)
+    return inputs
+
+
+def mono_sources(wildcards):
+    """What `open_frames` opens for the monocular pictures of a whole take."""
+    if take_of(wildcards).role == "tattoo":
+        pattern = R + "/takes/{subject}/{take}/inpaint/{chunk}"
+        return expand_chunks(pattern, wildcards.subject, wildcards.take)
+    return source_of(wildcards)
+
+
 def mono_camera(wildcards):
     """Name of the monocular camera: the frontal one of a rig, the only one of a video."""
     take = take_of(wildcards)

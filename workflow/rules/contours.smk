@@ -15,24 +15,6 @@ def contour_labels(wildcards):
     return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
 
 
-def mono_pictures(wildcards):
-    """Checked manifests of all chunks of a take, and its inpainted frames if it has a tattoo."""
-    folder = R + "/takes/{subject}/{take}"
-    name = (wildcards.subject, wildcards.take)
-    inputs = expand_chunks(folder + "/capture/{chunk}.json", *name)
-    if take_of(wildcards).role == "tattoo":
-        inputs += expand_chunks(folder + "/inpaint/{chunk}", *name)
-    return inputs
-
-
-def mono_sources(wildcards):
-    """What `open_frames` opens for the monocular pictures of a whole take."""
-    if take_of(wildcards).role == "tattoo":
-        pattern = R + "/takes/{subject}/{take}/inpaint/{chunk}"
-        return expand_chunks(pattern, wildcards.subject, wildcards.take)
-    return source_of(wildcards)
-
-
 rule contour_detector:
     """Trains the inner and outer contour detectors of a take: contours/detector.npz."""
     input:

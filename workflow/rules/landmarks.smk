@@ -1,9 +1,15 @@
-"""66 landmarks a frame (Mono13 5.1): by a trained regressor, by networks, or from files."""
+"""66 landmarks a frame (Mono13 5): by a trained regressor, by networks, or from files.
+
+With `landmarks.correction.mode: flow` these are landmarks/raw/{chunk}.npz; key frames are chosen
+among them (landmarks/key_frames.npz), and between these flow corrects (landmarks/{chunk}.npz).
+"""
 
 from vermilion.landmarks.labels import label_files
 from vermilion.landmarks.networks import FACE_FILE, LANDMARK_FILE
 
 LANDMARK_MODEL = R + "/landmarks/model.npz"
+LANDMARKS = R + "/takes/{subject}/{take}/landmarks"
+DETECTED = LANDMARKS + ("" if CONFIG.landmarks.correction.mode == "raw" else "/raw")
 
 
 def detector_files(wildcards):
@@ -85,16 +91,35 @@ rule landmark_model:
         "../scripts/landmark_model.py"
 
 
+def given_landmark_labels(wildcards):
+    """Landmarks that a person marked on frames of the take's monocular camera."""
+    take, camera = take_of(wildcards), mono_camera(wildcards)
+    paths = [Path(path) for path in landmark_label_files(take)]
+    return [
+        str(path)
+        for path in paths
+        if path.parent.name == camera and take.first <= int(path.stem) <= take.last
+    ]
+
+
+def key_frame_csv(wildcards):
+    """The file of another tracker whose landmarks count as key frames, where there is one."""
+    path = CONFIG.landmarks.key_frames.csv.path.format(
+        subject=wildcards.subject, take=wildcards.take, camera=mono_camera(wildcards)
+    )
+    return [path] if path and Path(path).is_file() else []
+
+
 rule landmarks:
-    """Finds the landmarks of a chunk of the monocular pictures: landmarks/{chunk}.npz."""
+    """Finds the landmarks of a chunk of the monocular pictures, each by itself."""
     input:
         unpack(mono_inputs),
         detector=detector_files,
         csv=landmark_csv_input,
     output:
-        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
-        quality=R + "/takes/{subject}/{take}/landmarks/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/landmarks/overlay/{chunk}.png",
+        landmarks=DETECTED + "/{chunk}.npz",
+        quality=DETECTED + "/quality/{chunk}.tsv",
+        overlay=DETECTED + "/overlay/{chunk}.png",
     log:
         R + "/logs/landmarks/{subject}-{take}-{chunk}.log",
     benchmark:
@@ -111,6 +136,60 @@ rule landmarks:
         model=detector_path,
     script:
         "../scripts/landmarks.py"
+
+
+if CONFIG.landmarks.correction.mode == "flow":
+
+    rule landmarks_key_frames:
+        """Chooses the key frames of a take by local binary patterns (Mono13 5.2)."""
+        input:
+            pictures=mono_pictures,
+            landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
+            labels=given_landmark_labels,
+            csv=key_frame_csv,
+        output:
+            key_frames=LANDMARKS + "/key_frames.npz",
+            table=LANDMARKS + "/key_frames.tsv",
+        log:
+            R + "/logs/landmarks_key_frames/{subject}-{take}.log",
+        benchmark:
+            R + "/benchmarks/landmarks_key_frames/{subject}-{take}.tsv"
+        resources:
+            mem_mb=1000,
+            runtime=60,
+        params:
+            cfg=cfg_of("landmarks.key_frames"),
+            code=code_of("landmarks_key_frames"),
+            source=mono_sources,
+            camera=mono_camera,
+        script:
+            "../scripts/landmarks_key_frames.py"
+
+    rule landmarks_corrected:
+        """Corrects the landmarks of a chunk by flow between key frames (Mono13 5.3)."""
+        input:
+            pictures=mono_pictures,
+            landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
+            key_frames=LANDMARKS + "/key_frames.npz",
+        output:
+            landmarks=LANDMARKS + "/{chunk}.npz",
+            quality=LANDMARKS + "/quality/{chunk}.tsv",
+            overlay=LANDMARKS + "/overlay/{chunk}.png",
+        log:
+            R + "/logs/landmarks_corrected/{subject}-{take}-{chunk}.log",
+        benchmark:
+            R + "/benchmarks/landmarks_corrected/{subject}-{take}-{chunk}.tsv"
+        resources:
+            mem_mb=1000,
+            runtime=120,
+        params:
+            cfg=cfg_of("landmarks.correction"),
+            code=code_of("landmarks_corrected"),
+            source=mono_sources,
+            camera=mono_camera,
+            frames=lambda wildcards: frames_in(wildcards.chunk),
+        script:
+            "../scripts/landmarks_corrected.py"
 
 
 rule landmarks_views:

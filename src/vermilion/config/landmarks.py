@@ -1,4 +1,4 @@
-"""Configuration of the landmarks stage: the detector, and how the embedded one is trained."""
+"""Configuration of the landmarks stage: detector, its training, key frames, correction."""
 
 from __future__ import annotations
 
@@ -87,8 +87,58 @@ class LandmarkTrainingConfig(StageConfig):
     seed: int = Field(0, ge=0, description="Seed of the starting shapes.")
 
 
+class KeyFramesConfig(StageConfig):
+    """Frames whose landmarks are trusted (Mono13 5.2; `correction.mode: flow`)."""
+
+    share: float = Field(
+        0.025,
+        gt=0,
+        le=1,
+        description="Initial key frames: the share of a take's frames that look most like the "
+        "first.",
+    )
+    max_clip: int = Field(
+        50,
+        ge=2,
+        le=100_000,
+        description="Longer clips between key frames are divided (frames).",
+    )
+    csv: LandmarkFilesConfig = Field(
+        default_factory=LandmarkFilesConfig,
+        description="Landmarks of another tracker, frame by frame, that count as key frames where "
+        "the file exists and the tracker was sure.",
+    )
+
+
+class LandmarkCorrectionConfig(StageConfig):
+    """Detected landmarks corrected by dense flow between key frames (Mono13 5.3)."""
+
+    mode: Literal["raw", "flow"] = Field(
+        "raw",
+        description="`raw`: as detected. `flow`: blended with what flow carries from the key frames "
+        "before and after; costs about 0.1 s a frame.",
+    )
+    mouth: float = Field(0.1, ge=0, le=1, description="Weight of the detector at the mouth.")
+    eyes: float = Field(0.5, ge=0, le=1, description="Weight of the detector at the eyes.")
+    jaw: float = Field(0.2, ge=0, le=1, description="Weight of the detector along the jaw.")
+    rest: float = Field(0.2, ge=0, le=1, description="Weight of the detector elsewhere.")
+    face_px: float = Field(
+        280.0,
+        ge=50,
+        le=2000,
+        description="Size of the face where flow is computed: root of its landmarks' box (pixels).",
+    )
+    tolerance: float = Field(
+        0.03,
+        gt=0,
+        le=1,
+        description="Flow that fails to lead back to where it came from by this much, summed from "
+        "the key frame on, counts half (face sizes).",
+    )
+
+
 class LandmarksConfig(StageConfig):
-    """66 landmarks a frame (Mono13 5.1)."""
+    """66 landmarks a frame (Mono13 5)."""
 
     detector: Literal["trained", "onnx", "csv"] = Field(
         "trained",
@@ -112,6 +162,12 @@ class LandmarksConfig(StageConfig):
     )
     training: LandmarkTrainingConfig = Field(
         default_factory=LandmarkTrainingConfig, description="The embedded regressor."
+    )
+    key_frames: KeyFramesConfig = Field(
+        default_factory=KeyFramesConfig, description="Frames whose landmarks are trusted."
+    )
+    correction: LandmarkCorrectionConfig = Field(
+        default_factory=LandmarkCorrectionConfig, description="Correction by flow between them."
     )
 
     @model_validator(mode="after")

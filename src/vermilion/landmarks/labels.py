@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,3 +59,8 @@ def read_labels(capture: str | Path) -> Iterator[LandmarkLabel]:
     """All labels of a capture folder."""
     for path in label_files(capture):
         yield read_label(path)
+
+
+def labels_by_frame(paths: Iterable[str | Path]) -> dict[int, np.ndarray]:
+    """Points (66, 2) px of the label files of one camera, by frame number."""
+    return {label.frame: label.points_px for label in map(read_label, paths)}

@@ -1,0 +1,216 @@
+"""Detected landmarks corrected by flow between key frames (Mono13 5.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vermilion.errors import InputError
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.flow import FaceFlow, carry_along
+from vermilion.landmarks.key_frames import KeyFrames, without_offset
+from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, face_size_px
+from vermilion.progress import progress
+from vermilion.quality import QualityRow
+
+FILLED = "no face found; filled by the flow"
+
+
+@dataclass(frozen=True)
+class CorrectionSettings:
+    """How detector and flow share.
+
+    Attributes:
+        mouth, eyes, jaw, rest: weight of the detected point, lambda of Mono13 eq. 4.
+        face_px: size of the face where flow is computed, see `FaceFlow`.
+        tolerance: share of the face's size that flow may fail to lead back by, summed over the
+            frames from the key frame, where its weight is halved.
+        fill_confidence: least mean confidence of the flow where it fills a frame without a face.
+    """
+
+    mouth: float = 0.1
+    eyes: float = 0.5
+    jaw: float = 0.2
+    rest: float = 0.2
+    face_px: float = 280.0
+    tolerance: float = 0.03
+    fill_confidence: float = 0.5
+
+    @classmethod
+    def of(cls, section: Mapping[str, Any]) -> CorrectionSettings:
+        """From the section `landmarks.correction` of the configuration."""
+        return cls(**{key: value for key, value in section.items() if key != "mode"})
+
+    def per_landmark(self) -> np.ndarray:
+        """Weights (66,) of the detected points."""
+        weights = np.full(N_LANDMARKS, self.rest)
+        weights[JAW], weights[MOUTH] = self.jaw, self.mouth
+        weights[np.concatenate([EYE_RIGHT, EYE_LEFT])] = self.eyes
+        return weights
+
+
+@dataclass(frozen=True)
+class FlowPoints:
+    """Where flow from the key frames puts the landmarks of some frames.
+
+    Attributes:
+        points_px: (F, 66, 2), NaN where no flow leads.
+        confidence: (F, 66) in [0, 1], zero where no flow leads.
+    """
+
+    points_px: np.ndarray
+    confidence: np.ndarray
+
+
+def correct(
+    read_grey: Callable[[int], np.ndarray],
+    detected: LandmarkTrack,
+    keys: KeyFrames,
+    frames: Sequence[int],
+    settings: CorrectionSettings | None = None,
+) -> tuple[LandmarkTrack, list[QualityRow]]:
+    """Corrected landmarks of some frames of a take, and quality rows.
+
+    The result of a frame does not depend on which others are asked for.
+
+    Args:
+        read_grey: display brightness (h, w) in [0, 1] of a frame; may raise InputError.
+        detected: landmarks of the whole take.
+        keys: of the same take.
+        frames: frame numbers, ascending.
+    """
+    settings = settings or CorrectionSettings()
+    unbiased = without_offset(detected, keys.given)
+    rows = np.searchsorted(detected.frames, frames)
+    flow = flow_points(read_grey, unbiased, keys, rows, settings)
+    at_key = np.isin(detected.frames[rows], list(keys.given))
+    track = blend(unbiased, rows, flow, at_key, settings)
+    return track, quality_rows(detected, rows, track, flow)
+
+
+def flow_points(
+    read_grey: Callable[[int], np.ndarray],
+    track: LandmarkTrack,
+    keys: KeyFrames,
+    rows: np.ndarray,
+    settings: CorrectionSettings,
+) -> FlowPoints:
+    """Flow from the key frames before and after, for some rows of a take's track."""
+    points = np.full((len(track.frames), N_LANDMARKS, 2), np.nan)
+    confidence = np.zeros(points.shape[:2])
+    key_rows = np.searchsorted(track.frames, keys.frames)
+    points[key_rows], confidence[key_rows] = keys.points_px, 1.0
+    shapes = rough_shapes(track, keys)
+    ends = np.concatenate([[-1], key_rows, [len(track.frames)]])
+    for clip in range(len(ends) - 1):
+        inside = np.arange(ends[clip] + 1, ends[clip + 1])
+        if not len(keys.frames) or not np.isin(inside, rows).any():
+            continue
+        before = keys.points_px[clip - 1] if clip > 0 else None
+        after = keys.points_px[clip] if clip < len(key_rows) else None
+        span = np.arange(max(ends[clip], 0), min(ends[clip + 1] + 1, len(track.frames)))
+        found = _clip_points(read_grey, track.frames, span, shapes, (before, after), settings)
+        keep = np.isin(span, inside)
+        points[span[keep]], confidence[span[keep]] = found[0][keep], found[1][keep]
+    return FlowPoints(points[rows], confidence[rows])
+
+
+def _clip_points(read_grey, frames, span, shapes, ends, settings):
+    """Points (n, 66, 2) and confidence (n, 66) of the rows `span` between two key frames."""
+    read, flows, last = [], [], None
+    engine = FaceFlow(settings.face_px)
+    for row in progress(span, "flow"):
+        try:
+            grey = read_grey(int(frames[row]))
+        except InputError:
+            continue
+        if last is not None:
+            flows.append(engine.between(last, grey, shapes[read[-1]], shapes[row]))
+        last = grey
+        read.append(row)
+    points = np.full((len(span), N_LANDMARKS, 2), np.nan)
+    confidence = np.zeros(points.shape[:2])
+    at = np.isin(span, read)
+    tolerance = settings.tolerance * face_size_px(shapes[read])[:, None]
+    paths = []
+    if ends[0] is not None:
+        paths.append(carry_along(flows, ends[0]))
+    if ends[1] is not None:
+        back = carry_along([flow.reversed() for flow in flows[::-1]], ends[1])
+        paths.append((back[0][::-1], back[1][::-1]))
+    trust = [1 / (1 + (astray / tolerance) ** 2) for _, astray in paths]
+    if len(paths) == 1:
+        points[at], confidence[at] = paths[0][0], trust[0]
+        return points, confidence
+    progress_ = (np.asarray(read) - span[0]) / (span[-1] - span[0])
+    later = (0.5 - 0.5 * np.cos(np.pi * progress_))[:, None]
+    weights = np.stack([(1 - later) * trust[0], later * trust[1]])
+    confidence[at] = weights.sum(axis=0)
+    weights = (weights / np.maximum(weights.sum(axis=0), 1e-12))[..., None]
+    points[at] = weights[0] * paths[0][0] + weights[1] * paths[1][0]
+    return points, confidence
+
+
+def blend(
+    track: LandmarkTrack,
+    rows: np.ndarray,
+    flow: FlowPoints,
+    at_given: np.ndarray,
+    settings: CorrectionSettings,
+) -> LandmarkTrack:
+    """Detected and flow points together (Mono13 eq. 4), for some rows of a track.
+
+    The weight 1 - lambda of the flow is multiplied by its confidence. Where no face was found the
+    flow stands alone, if it is sure enough; at given key frames (F,) the given points do.
+    """
+    detected, valid = track.points_px[rows], track.valid[rows]
+    weight = settings.per_landmark()
+    share = (1 - weight) * flow.confidence / ((1 - weight) * flow.confidence + weight + 1e-12)
+    share = np.where((at_given | ~valid)[:, None], 1.0, share)[..., None]
+    points = np.where(share > 0, share * np.nan_to_num(flow.points_px), 0.0)
+    points = points + np.where(share < 1, (1 - share) * np.nan_to_num(detected), 0.0)
+    filled = ~valid & (flow.confidence.mean(axis=1) >= settings.fill_confidence)
+    good = valid | filled | at_given
+    confidence = np.where(valid[:, None], track.confidence[rows], flow.confidence)
+    return LandmarkTrack(
+        track.frames[rows],
+        np.where(good[:, None, None], points, np.nan),
+        np.where(good[:, None], confidence, 0.0),
+        good,
+    )
+
+
+def rough_shapes(track: LandmarkTrack, keys: KeyFrames) -> np.ndarray:
+    """About where the face is in every frame (F, 66, 2): between found faces, interpolated."""
+    points = track.points_px.copy()
+    points[np.searchsorted(track.frames, keys.frames)] = keys.points_px
+    known = np.flatnonzero(np.isfinite(points).all(axis=(1, 2)))
+    if not len(known):
+        return points
+    rows = np.arange(len(points))
+    after = np.clip(np.searchsorted(known, rows), 0, len(known) - 1)
+    before = np.clip(np.searchsorted(known, rows, side="right") - 1, 0, len(known) - 1)
+    low, high = known[before], known[after]
+    part = np.where(high > low, (rows - low) / np.maximum(high - low, 1), 0.0)[:, None, None]
+    return (1 - part) * points[low] + part * points[high]
+
+
+def quality_rows(
+    detected: LandmarkTrack, rows: np.ndarray, track: LandmarkTrack, flow: FlowPoints
+) -> list[QualityRow]:
+    """A row a frame: how far the correction moved the points, how sure flow and detector are."""
+    result = []
+    for k, row in enumerate(rows):
+        found, good = bool(detected.valid[row]), bool(track.valid[k])
+        moved = np.linalg.norm(track.points_px[k] - detected.points_px[row], axis=1).mean()
+        figures = {
+            "confidence": round(float(track.confidence[k].mean()), 4),
+            "flow_confidence": round(float(flow.confidence[k].mean()), 4),
+            "correction_px": round(float(moved), 3) if found else np.nan,
+        }
+        reason = "" if found else FILLED if good else "no face found"
+        result.append(QualityRow(int(detected.frames[row]), good, reason, figures))
+    return result

@@ -1,0 +1,70 @@
+"""Detected against corrected landmarks over the pictures."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.errors import InputError
+from vermilion.frames import FrameSource
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.key_frames import KeyFrames
+from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
+
+_SIDE_PX = 480
+_DETECTED, _CORRECTED, _LIPS = (255, 60, 40), (60, 255, 60), (255, 255, 0)
+
+
+def correction_overlay(
+    source: FrameSource,
+    camera: str,
+    detected: LandmarkTrack,
+    corrected: LandmarkTrack,
+    keys: KeyFrames,
+    count: int = 9,
+    columns: int = 3,
+) -> np.ndarray:
+    """Frames of `corrected`, evenly spread, cut to the face; (h, w, 3) uint8.
+
+    Red: detected; green: corrected, with lines from red to green and yellow lips. Key frames are
+    named in the label.
+
+    Args:
+        detected: of the same frames or more.
+    """
+    rows = np.unique(np.linspace(0, len(corrected.frames) - 1, count).round().astype(int))
+    kinds = dict(zip(keys.frames.tolist(), keys.kinds.tolist(), strict=True))
+    pictures = []
+    for row in rows:
+        frame = int(corrected.frames[row])
+        try:
+            picture = to_display(source.read(camera, frame))
+        except InputError:
+            picture = np.zeros((240, 320, 3), dtype=np.uint8)
+        points = corrected.points_px[row]
+        before = detected.points_px[np.searchsorted(detected.frames, frame)]
+        text = f"{frame}" + (f": key frame ({kinds[frame]})" if frame in kinds else "")
+        if not corrected.valid[row]:
+            pictures.append(label(picture, f"{frame}: no face found"))
+            continue
+        to_cut = _square_round(points)
+        picture = cv2.warpAffine(picture, to_cut, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_AREA)
+        points, before = (p @ to_cut[:, :2].T + to_cut[:, 2] for p in (points, before))
+        for loop in (LIP_OUTER, LIP_INNER):
+            picture = draw_polyline(picture, points[loop], _LIPS)
+        if np.isfinite(before).all():
+            for a, b in zip(before, points, strict=True):
+                picture = draw_polyline(picture, np.stack([a, b]), _DETECTED, closed=False)
+            picture = draw_points(picture, before, _DETECTED, 2)
+        pictures.append(label(draw_points(picture, points, _CORRECTED, 2), text))
+    return tile(pictures, columns)
+
+
+def _square_round(points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
+    """Affine map (2, 3) of the square round points (N, 2) to the side of the overlay's pictures."""
+    low, high = points_px.min(axis=0), points_px.max(axis=0)
+    half = 0.5 * (1 + 2 * margin) * max(float((high - low).max()), 8.0)
+    scale = _SIDE_PX / (2 * half)
+    corner = 0.5 * (low + high) - half
+    return np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale]])

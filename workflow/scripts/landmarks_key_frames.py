@@ -1,0 +1,38 @@
+"""Key frames of a take: given ones, and those chosen by local binary patterns."""
+
+from vermilion.frames import open_frames
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.gradients import grey_of
+from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
+from vermilion.landmarks.labels import labels_by_frame
+from vermilion.landmarks.table import read_landmark_csv
+from vermilion.logfile import log_to
+from vermilion.tables import write_table
+
+
+def main(snakemake):
+    cfg, camera = snakemake.params.cfg["landmarks.key_frames"], snakemake.params.camera
+    source = open_frames(
+        snakemake.params.source, snakemake.wildcards.subject, snakemake.wildcards.take
+    )
+    track = LandmarkTrack.load(list(snakemake.input.landmarks))
+    given = {}
+    for path in snakemake.input.csv:
+        settings = {k: v for k, v in cfg["csv"].items() if k != "path"}
+        found = read_landmark_csv(path, **settings).by_frame
+        given |= {frame: entry.points_px for frame, entry in found.items()}
+    given |= labels_by_frame(snakemake.input.labels)  # a person is right where both speak
+    keys = find_key_frames(
+        lambda frame: grey_of(source.read(camera, frame)),
+        without_offset(track, given),
+        given,
+        settings=KeyFrameSettings(cfg["share"], cfg["max_clip"]),
+    )
+    print(f"{len(keys.frames)} key frames of {len(track.frames)} frames")
+    write_table(snakemake.output.table, keys.table())
+    keys.save(snakemake.output.key_frames)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
