@@ -3,8 +3,8 @@
     python -m benchmarks.bench_landmarks RESULTS SUBJECT/TAKE [key=value ...]
 
 RESULTS is the folder of a finished run. Keys: `captures` and `truth`, folders of captures and of true
-meshes (by default those in RESULTS); `camera` (`cam`); and fields of `CorrectionSettings`. Truth is
-used to measure alone.
+meshes (by default those in RESULTS); `camera` (`cam`); `models`, a folder of networks to time; and
+fields of `CorrectionSettings`. Truth is used to measure alone.
 
 Expressive frames are the eleven whose landmarks moved most in the face since the first frame, as
 many as Mono13's table 1 has a sequence. The detector and a modeller name different places, so there
@@ -35,6 +35,7 @@ from vermilion.landmarks.correction import CorrectionSettings, correct
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import find_key_frames, without_offset
+from vermilion.landmarks.networks import NetworkDetector
 from vermilion.landmarks.scheme import BROWS, JAW, MOUTH, N_LANDMARKS, NOSE, interocular_px
 from vermilion.raycast import RayCaster
 from vermilion.tracking.expression import fit_motion
@@ -147,6 +148,14 @@ def main(results: str, name: str, places: dict[str, str], changes: dict[str, flo
         n = len(detected.frames)
         print(f"  {len(keys.frames)} key frames; CPU ms a frame: key frames "
               f"{1e3 * (chosen - start) / n:.0f}, correction {1e3 * (done - chosen) / n:.0f}")  # fmt: skip
+    if "models" in places:
+        pictures = [source.read(camera.name, int(frame)) for frame in detected.frames[:20]]
+        detector = NetworkDetector(places["models"])
+        start = time.process_time()
+        for picture in pictures:
+            detector.detect(picture)
+        spent = 1e3 * (time.process_time() - start) / len(pictures)
+        print(f"  networks: {spent:.1f} CPU ms a frame")
     if (folder / "tracking" / "fit.npz").is_file():
         time_fit(root, subject, folder, detected)
 
@@ -165,5 +174,7 @@ def time_fit(root: Path, subject: str, folder: Path, track: LandmarkTrack) -> No
 
 if __name__ == "__main__":
     options = dict(item.split("=", 1) for item in sys.argv[3:])
-    named = {key: options.pop(key) for key in ("captures", "truth", "camera") if key in options}
+    named = {
+        key: options.pop(key) for key in ("captures", "truth", "camera", "models") if key in options
+    }
     main(sys.argv[1], sys.argv[2], named, {key: float(value) for key, value in options.items()})
