@@ -47,9 +47,9 @@ the choice of its parameters. Frames that were not tracked are left out and list
 the neutral). Where truth is known, that point goes on to the nearest point of the truth's neutral that
 faces the same way and is not on the other lip, and is then followed through the truth's frames. Vertices
 without such a point are not measured. Where no truth is known, the held-out H takes its place.</p>
-<p><b>Alignment.</b> One rigid motion a frame, without scale, brings the base track onto the truth: area-
-weighted least squares over the face outside the mouth mask. All corrections of the frame share it, so
-that they differ from the base by their correction alone. H is measured without alignment.</p>
+<p><b>Alignment.</b> One rigid motion a frame, without scale, brings a track onto the truth: area-weighted
+least squares over the face outside the mouth mask, each regressor by itself. H is measured without
+alignment.</p>
 <p><b>Regions.</b> <i>mouth</i>: the triangles of the correction layer; <i>vermilion</i>: the red of both
 lips; <i>face</i>: the face. The inside of the mouth is in none of them. Every mean, deviation and
 percentile is weighted by the area of the neutral.</p>
@@ -57,7 +57,8 @@ percentile is weighted by the area of the neutral.</p>
 nearest point of the true surface. Gap: lowest point of the upper lip less highest point of the lower, in
 seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
 time, less that of the truth. Contour error: distance of contour points found in the picture to the
-projected contours of the mesh, per inter-ocular distance. Feature error: RMS of regressed against true
+projected contours of the mesh, per inter-ocular distance. Lip penetration: frames in which an edge of one lip enters
+the other. Feature error: RMS of regressed against true
 layer entries.</p>
 <p><b>Kinds of mouth shapes.</b> By the true expression weights where they are known, each over a threshold
 (pucker or funnel, rolls, presses, jaw, smiles), else by width, gap, height of the red and protrusion of the
