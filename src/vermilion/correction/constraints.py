@@ -42,8 +42,8 @@ class Rows:
         return len(self.wanted)
 
     def __add__(self, other: Rows) -> Rows:
-        if len(other) == 0:
-            return self
+        if len(self) == 0 or len(other) == 0:
+            return self if len(self) else other
         width = max(self.vertices.shape[1], other.vertices.shape[1])
         pairs = [(getattr(self._padded(width), f.name), getattr(other._padded(width), f.name))
                  for f in fields(self)]  # fmt: skip

@@ -6,6 +6,8 @@ so it is not left to either (Lips16 section 7 names contours as constraints of t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vermilion.correction.constraints import ConstraintSolver, Rows
@@ -22,7 +24,9 @@ from vermilion.landmarks.scheme import EYE_CORNERS
 
 #: Least share of known contour points for a frame's own motion.
 _LEAST_KNOWN = 0.3
-_ROUNDS = 8
+#: Rounds of parting the lips, with how much of the contours' weight.
+_ROUNDS, _CONTOURS_COUNT = 8, (1.0, 0.1, 0.01)
+_MOST_ROWS = 800
 
 
 class PictureFit:
@@ -122,14 +126,26 @@ class PictureFit:
                 self._samples, vertices, picture.inner_px[f], lines[2][n:], unit_px,
                 view / np.linalg.norm(view), weight,
             )  # fmt: skip
-        ids, now = self._crossings.vertices, np.array(vertices)
-        for _ in range(_ROUNDS):
-            forces = self._solver.multipliers(rows)
-            now[ids] = vertices[ids] + self._solver.near_moves(rows, forces, ids)
-            parting, _ = parting_rows(self._crossings, vertices, now)
-            if len(parting) == 0:
-                break
-            rows += parting
-        else:
-            forces = self._solver.multipliers(rows)
-        return rows, forces
+        return self._parted(vertices, rows)
+
+    def _parted(self, vertices: np.ndarray, rows: Rows) -> tuple[Rows, np.ndarray]:
+        """Rows and forces that leave no lip in the other: an active set, found again each round.
+
+        Should contours press the lips together so that no set is enough, they count less and less; the
+        least deep result stands where nothing helps.
+        """
+        ids, now, least, best = self._crossings.vertices, np.array(vertices), np.inf, None
+        for counts in _CONTOURS_COUNT:
+            both = replace(rows, compliance=rows.compliance / counts)
+            for _ in range(_ROUNDS):
+                forces = self._solver.multipliers(both)
+                now[ids] = vertices[ids] + self._solver.near_moves(both, forces, ids)
+                through, deepest_mm = parting_rows(self._crossings, vertices, now)
+                if deepest_mm < least:
+                    least, best = deepest_mm, (both, forces)
+                if len(through) == 0:
+                    return both, forces
+                both += through
+                if len(both) > _MOST_ROWS:
+                    break
+        return best
