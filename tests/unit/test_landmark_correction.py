@@ -82,10 +82,18 @@ def test_correction_is_nearer_to_the_truth_and_keeps_the_key_frames(clip):
     assert np.allclose(found.points_px[[0, -1]], truth[[0, -1]])
     raw_px = np.linalg.norm(track.points_px - truth, axis=-1)[1:-1]
     left_px = np.linalg.norm(found.points_px - truth, axis=-1)[1:-1]
-    assert left_px[:, 48:].mean() < 0.3 * raw_px[:, 48:].mean()  # mouth, lambda 0.1
+    assert left_px[:, 48:59].mean() < 0.3 * raw_px[:, 48:59].mean()  # mouth, lambda 0.1
     assert 0.4 < left_px[:, 36:48].mean() / raw_px[:, 36:48].mean() < 0.7  # eyes, lambda 0.5
     assert rows[0].figures["correction_px"] == pytest.approx(0, abs=1e-6)
     assert rows[2].figures["correction_px"] > 1
+
+
+def test_weights_are_those_of_the_paper_but_on_the_inner_lips():
+    weights = CorrectionSettings().per_landmark()
+    inner = [59, 60, 61, 63, 64, 65]
+    outer = np.setdiff1d(np.arange(48, 66), inner)  # with both mouth corners
+    assert (weights[outer] == 0.1).all() and (weights[inner] == 0.5).all()
+    assert (weights[36:48] == 0.5).all() and (weights[:36] == 0.2).all()
 
 
 def test_frames_do_not_depend_on_the_chunk(clip):

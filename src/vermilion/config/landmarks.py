@@ -119,6 +119,13 @@ class LandmarkCorrectionConfig(StageConfig):
         "before and after; costs about 0.1 s a frame.",
     )
     mouth: float = Field(0.1, ge=0, le=1, description="Weight of the detector at the mouth.")
+    inner_lips: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="Weight of the detector at the inner lip contour, where flow stays on teeth "
+        "(0.1: as the rest of the mouth, Mono13).",
+    )
     eyes: float = Field(0.5, ge=0, le=1, description="Weight of the detector at the eyes.")
     jaw: float = Field(0.2, ge=0, le=1, description="Weight of the detector along the jaw.")
     rest: float = Field(0.2, ge=0, le=1, description="Weight of the detector elsewhere.")

@@ -12,7 +12,16 @@ from vermilion.errors import InputError
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.flow import FaceFlow, carry_along
 from vermilion.landmarks.key_frames import KeyFrames, without_offset
-from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, face_size_px
+from vermilion.landmarks.scheme import (
+    EYE_LEFT,
+    EYE_RIGHT,
+    JAW,
+    LIP_INNER,
+    LIP_OUTER,
+    MOUTH,
+    N_LANDMARKS,
+    face_size_px,
+)
 from vermilion.progress import progress
 from vermilion.quality import QualityRow
 
@@ -25,6 +34,8 @@ class CorrectionSettings:
 
     Attributes:
         mouth, eyes, jaw, rest: weight of the detected point, lambda of Mono13 eq. 4.
+        inner_lips: the same of the inner contour between the corners. It is an outline: as the
+            mouth opens, flow stays on the teeth, and leads back from there too.
         face_px: size of the face where flow is computed, see `FaceFlow`.
         tolerance: share of the face's size that flow may fail to lead back by, summed over the
             frames from the key frame, where its weight is halved.
@@ -32,6 +43,7 @@ class CorrectionSettings:
     """
 
     mouth: float = 0.1
+    inner_lips: float = 0.5
     eyes: float = 0.5
     jaw: float = 0.2
     rest: float = 0.2
@@ -48,6 +60,7 @@ class CorrectionSettings:
         """Weights (66,) of the detected points."""
         weights = np.full(N_LANDMARKS, self.rest)
         weights[JAW], weights[MOUTH] = self.jaw, self.mouth
+        weights[np.setdiff1d(LIP_INNER, LIP_OUTER)] = self.inner_lips
         weights[np.concatenate([EYE_RIGHT, EYE_LEFT])] = self.eyes
         return weights
 
