@@ -19,6 +19,7 @@ include: "workflow/rules/inpaint.smk"
 include: "workflow/rules/scan.smk"
 include: "workflow/rules/tracking.smk"
 include: "workflow/rules/refinement.smk"
+include: "workflow/rules/detail.smk"
 include: "workflow/rules/contours.smk"
 include: "workflow/rules/correspondence.smk"
 include: "workflow/rules/features.smk"
@@ -50,6 +51,12 @@ rule database_only:
     """The training database of all subjects (Lips16 section 3)."""
     input:
         R + "/database/lips.h5",
+
+
+rule detail:
+    """The finer sequences of `detail.takes` (Mono13 section 7)."""
+    input:
+        detail_outputs(),
 
 
 rule regressors:

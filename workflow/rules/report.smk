@@ -39,6 +39,9 @@ def quality_files():
     paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
     paths += [f"{R}/subjects/{name}/scan/quality/scan.tsv" for name in CONFIG.tracking.scans]
     paths += of_takes(EVALUATED + "/quality.tsv", evaluated_takes())
+    for take in detail_takes():
+        pattern = R + "/takes/{subject}/{take}/detail/quality/{chunk}.tsv"
+        paths += expand_chunks(pattern, take.subject, take.take)
     for name in applied_takes():
         paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))
     return paths
@@ -58,6 +61,9 @@ def stage_overlays():
         chunk = chunks(take.subject, take.take)[0]
         rows.append(["refinement", f"{take.name}, appearance", f"{folder}/appearance.png"])
         rows.append(["refinement", take.name, f"{folder}/residuals/overlay/{chunk}.png"])
+    for take in detail_takes():
+        pattern = R + "/takes/{subject}/{take}/detail/overlay/{chunk}.png"
+        rows.append(["detail", take.name, expand_chunks(pattern, take.subject, take.take)[0]])
     for take in used_takes(("tattoo", "plain")):
         path = f"{R}/takes/{take.name}/multiview/overlay/neutral.png"
         rows.append(["multiview", f"{take.name}, neutral", path])

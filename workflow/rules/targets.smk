@@ -85,6 +85,7 @@ def all_outputs():
         *take_outputs(),
         *clip_outputs(),
         *subject_outputs(),
+        *detail_outputs(),
         R + "/database/lips.h5",
         *regressor_outputs(),
         *evaluation_outputs(),

@@ -11,6 +11,7 @@ from vermilion.config.contours import ContoursConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.config.database import DatabaseConfig
+from vermilion.config.detail import DetailConfig
 from vermilion.config.evaluation import EvaluationConfig
 from vermilion.config.face_model import FaceModelConfig
 from vermilion.config.features import FeaturesConfig
@@ -64,6 +65,9 @@ class Configuration(StageConfig):
     refinement: RefinementConfig = Field(
         default_factory=RefinementConfig,
         description="Dense refinement of the track by its pictures (Lips16 3.2).",
+    )
+    detail: DetailConfig = Field(
+        default_factory=DetailConfig, description="A finer sequence than C (Mono13 7)."
     )
     contours: ContoursConfig = Field(
         default_factory=ContoursConfig, description="Lip contour likelihood maps (Lips16 3.2.2)."

@@ -1,0 +1,89 @@
+"""Configuration of the finer sequence: dense correction of the coarse meshes (Mono13 7)."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from vermilion.config.base import StageConfig
+
+
+class FlowEnergyConfig(StageConfig):
+    """Weights of the six-frame flow (Mono13 eq. 9) and how it is minimised."""
+
+    smoothness: tuple[float, float, float, float, float] = Field(
+        (250.0, 300.0, 150.0, 300.0, 150.0),
+        description="Smoothness of the flows w1 to w5 (alpha_1 to alpha_5; colours from 0 to 255).",
+    )
+    similarity: float = Field(
+        50.0,
+        ge=0,
+        description="Likeness of the corrective flows of neighbouring frames (gamma; per px squared).",
+    )
+    gradient_weight: float = Field(
+        1.0,
+        ge=0,
+        le=100,
+        description="Worth of gradient constancy against colour constancy (share).",
+    )
+    structure_px: float = Field(
+        0.1,
+        gt=0,
+        le=10,
+        description="Slope of a flow above which smoothness gives way (px per px).",
+    )
+    data_floor: float = Field(
+        0.001,
+        gt=0,
+        le=10,
+        description="Differences below count squared (display values, 0 to 255).",
+    )
+    warps: int = Field(3, ge=1, le=50, description="Linearisations a level (count).")
+    sweeps: int = Field(
+        8, ge=1, le=500, description="Sweeps of relaxation a linearisation (count)."
+    )
+    omega: float = Field(1.6, gt=0, lt=2, description="Over-relaxation of a sweep (factor).")
+
+
+class DeformationConfig(StageConfig):
+    """How far the mesh follows the flow (Mono13 eq. 14)."""
+
+    mu: float = Field(0.5, gt=0, le=100, description="Trust in the flow against the mesh's shape.")
+    spacing_px: float = Field(
+        4.0,
+        ge=0,
+        le=100,
+        description="One vertex follows the flow in each square of this side; 0: all visible ones "
+        "(working pixels).",
+    )
+    pose: bool = Field(
+        True,
+        description="Move the head as a whole first, as the flow of forehead, temples and nose bridge "
+        "asks; `false`: the paper's motion parallel to the image only.",
+    )
+    depth_sigma_mm: float = Field(
+        3.0, gt=0, le=1000, description="Typical error of the head's distance, for `pose` (mm)."
+    )
+
+
+class DetailConfig(StageConfig):
+    """The finer sequence, in `detail/` of a take."""
+
+    takes: list[str] = Field(
+        default_factory=list,
+        description="Takes (subject/take) of role video or tattoo that are refined; none by default.",
+    )
+    face_px: int = Field(
+        480,
+        ge=64,
+        le=4096,
+        description="A larger face is reduced to this for the flow (longer side, pixels).",
+    )
+    flow: FlowEnergyConfig = Field(
+        default_factory=FlowEnergyConfig, description="The corrective flow (Mono13 7.1)."
+    )
+    deformation: DeformationConfig = Field(
+        default_factory=DeformationConfig, description="The mesh after the flow (Mono13 7.2)."
+    )
+    overlay_frames: int = Field(
+        4, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+    )
