@@ -24,6 +24,7 @@ rule measures:
             labels={"table": "kinds of mouth shapes"},
             caption="../report/kinds.rst",
         ),
+        seconds=R + "/evaluation/seconds.tsv",
         comparisons=R + "/evaluation/comparisons.tsv",
         table2=R + "/evaluation/table2.tsv",
         table3=R + "/evaluation/table3.tsv",

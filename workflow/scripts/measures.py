@@ -25,12 +25,12 @@ def main(snakemake):
         tables.append(pooled_rows([takes[index] for index in members], *pooled, group))
     tables.append(pooled_rows(reconstructions, *pooled))
     tables += [read_table(path, COLUMNS) for path in snakemake.input.tables]
-    if takes:
-        names = [take["take"] for take in snakemake.params.takes]
-        frames = dict(zip(names, (count for _, count in takes), strict=True))
-        tables.append(seconds_rows([read_table(path) for path in snakemake.input.seconds], frames))
     measures = pd.concat([table for table in tables if len(table)] or tables[:1], ignore_index=True)
     write_table(snakemake.output.measures, measures)
+    names = [take["take"] for take in snakemake.params.takes]
+    frames = dict(zip(names, (count for _, count in takes), strict=True))
+    seconds = [read_table(path) for path in snakemake.input.seconds]
+    write_table(snakemake.output.seconds, seconds_rows(seconds, frames))
     write_table(snakemake.output.kinds, kind_rows(takes, *pooled))
     summary = table1(measures)
     write_table(snakemake.output.table1, summary)

@@ -69,6 +69,8 @@ def seconds_rows(tables: Sequence[pd.DataFrame], frames: Mapping[str, int]) -> p
         tables: columns subject, take, regressor, seconds_per_frame, a table a take.
         frames: `subject/take` -> frames measured.
     """
+    if not tables:
+        return pd.DataFrame(columns=list(COLUMNS))
     rows = pd.concat(tables, ignore_index=True)
     rows["frames"] = [
         frames[f"{s}/{t}"] for s, t in zip(rows["subject"], rows["take"], strict=True)
