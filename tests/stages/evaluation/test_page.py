@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 #: Tables and figures of all takes together, file names by output.
 TOGETHER = {
-    "measures": "measures.tsv", "kinds": "kinds.tsv", "table1": "table1.tsv", "table2": "table2.tsv",
+    "measures": "measures.tsv", "seconds": "seconds.tsv", "kinds": "kinds.tsv", "table1": "table1.tsv", "table2": "table2.tsv",
     "table3": "table3.tsv", "comparisons": "comparisons.tsv", "estimators": "estimators.tsv",
     "picture": "table1.png", "figure16": "figure16.png",
 }  # fmt: skip
