@@ -13,6 +13,8 @@ from vermilion.images import read_image, write_image
 from vermilion.sequences import write_sequence
 from vermilion.tables import read_table
 
+pytestmark = pytest.mark.slow
+
 POSES = [(0.0, 0.0), (3.0, 0.2), (6.0, 0.1)]
 CFG = {
     "capture.frontal_camera": "front",

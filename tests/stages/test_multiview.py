@@ -17,6 +17,8 @@ from vermilion.mesh import vertex_normals
 from vermilion.sequences import read_mesh, read_sequence
 from vermilion.tables import read_table
 
+pytestmark = pytest.mark.slow
+
 POSES = [(0.0, 0.0), (0.7, 0.02), (1.5, 0.05), (2.2, 0.1)]
 LOST = {(2, "left")}  # a frame that a camera misses
 PLACE = {"subject": "s1", "take": "rom"}

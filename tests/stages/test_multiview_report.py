@@ -15,6 +15,8 @@ from tests.stages.run_script import run_script
 from tests.stages.test_multiview import CFG, PLACE, inputs, make_capture, reconstruct
 from vermilion.tables import read_table
 
+pytestmark = pytest.mark.slow
+
 #: One camera misses a frame; of another frame a single picture is left.
 LOST = {(1, "left"), (3, "front"), (3, "left")}
 FULL_SIZE = {**CFG, "multiview.drift": {**CFG["multiview.drift"], "scale": 1.0}}

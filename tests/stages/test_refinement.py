@@ -14,6 +14,8 @@ from vermilion.sequences import read_sequence
 from vermilion.tables import read_table
 from vermilion.tracking.result import TrackedTake
 
+pytestmark = pytest.mark.slow
+
 N_FRAMES = 6
 MODEL = dome()
 NAMES = {"subject": "s", "take": "t"}
