@@ -33,9 +33,8 @@ from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.mesh import rigid_alignment, vertex_normals
 from vermilion.photometric.appearance import Appearance
-from vermilion.photometric.frame_fit import FrameProblem
-from vermilion.photometric.layer import CorrectiveLayer
-from vermilion.photometric.settings import layer_settings, photometric_settings
+from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.photometric.layer import CorrectiveLayer, LayerSettings
 from vermilion.photometric.take import TakeStart
 from vermilion.raycast import RayCaster
 from vermilion.sequences import read_sequence
@@ -133,9 +132,9 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     start = TakeStart.of(model, person, fit, track, settings)
     appearance = Appearance.load(folder / "appearance.npz")
     face = start.face(appearance.samples)
-    photometric = photometric_settings(options["fit"])
+    photometric = PhotometricSettings(**options["fit"])
     problem = FrameProblem(face, appearance, photometric, settings.weight_sigma)
-    bending = layer_settings(options["offsets"])
+    bending = LayerSettings(**options["offsets"])
     layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
     frames, levels = open_frames(source), len(photometric.iterations)
     rows = np.unique(np.linspace(0, len(fit.frames) - 1, count).round().astype(int))

@@ -80,6 +80,23 @@ class Camera:
         pixels = np.asarray(self.colmap().img_from_cam(flat)).reshape(*local.shape[:-1], 2)
         return np.where(depth > 1e-9, pixels, np.nan)
 
+    def pixel_jacobian(self, points_mm: np.ndarray, step_mm: float = 0.05) -> np.ndarray:
+        """Change of the pixel by the world point, (..., 2, 3) px/mm, at points (..., 3).
+
+        Exact for a pinhole; by central differences of `step_mm` for other lenses.
+        """
+        points_mm = np.asarray(points_mm, dtype=np.float64)
+        if not self.is_pinhole:
+            moves = step_mm * np.eye(3)
+            slopes = [self.project(points_mm + m) - self.project(points_mm - m) for m in moves]
+            return np.stack(slopes, axis=-1) / (2 * step_mm)
+        k, local = self.calibration, self.to_camera(points_mm)
+        x, y, z = np.moveaxis(local, -1, 0)
+        inner = np.zeros((*local.shape[:-1], 2, 3))
+        inner[..., 0, 0], inner[..., 1, 1] = k[0, 0] / z, k[1, 1] / z
+        inner[..., 0, 2], inner[..., 1, 2] = -k[0, 0] * x / z**2, -k[1, 1] * y / z**2
+        return inner @ self.rotation
+
     def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Origins and unit directions in the world of pixels (..., 2), both (..., 3)."""
         pixels = np.asarray(pixels, dtype=np.float64)

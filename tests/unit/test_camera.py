@@ -53,3 +53,13 @@ def test_resizing_scales_pixels(cameras):
 def test_folder_without_cameras_is_named(tmp_path):
     with pytest.raises(InputError, match=r"no cameras.txt.*COLMAP text model"):
         read_cameras(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["a", "b"])  # a pinhole, and a lens that distorts
+def test_pixel_jacobian_is_the_derivative_of_the_projection(cameras, name):
+    camera, step = cameras[name], 1e-4
+    points = np.random.default_rng(3).uniform(-60, 60, (4, 10, 3))
+    found = camera.pixel_jacobian(points)
+    for axis, move in enumerate(step * np.eye(3)):
+        slope = (camera.project(points + move) - camera.project(points - move)) / (2 * step)
+        assert np.abs(found[..., axis] - slope).max() < 1e-5

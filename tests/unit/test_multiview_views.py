@@ -14,7 +14,6 @@ from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.multiview.views import (
     load_frame,
     normalise,
-    pixel_jacobian,
     sample,
     undistorted,
 )
@@ -56,15 +55,6 @@ def test_points_that_fewer_than_two_views_trust_are_unknown():
     assert not found.valid[5]
     assert np.isnan(found.points_mm[5]).all()
     assert found.valid.sum() == 65
-
-
-def test_jacobian_is_the_derivative_of_the_projection():
-    step = 1e-4
-    exact = pixel_jacobian(RIG["a"], POINTS)
-    for axis in range(3):
-        move = step * np.eye(3)[axis]
-        slope = (RIG["a"].project(POINTS + move) - RIG["a"].project(POINTS - move)) / (2 * step)
-        assert np.abs(exact[:, :, axis] - slope).max() < 1e-5
 
 
 def test_sampling_a_linear_picture_is_exact_at_many_points():

@@ -15,7 +15,6 @@ from vermilion.correction.picture import (
     Picture,
     PictureSettings,
     frames_around,
-    projection_jacobian,
 )
 from vermilion.correction.picture_fit import PictureFit
 from vermilion.correction.repose import ANCHORS, smoothed_motion
@@ -79,14 +78,6 @@ def distance_px(mesh_mm, picture, f=0):
 
 def depth_in_other_lip(mesh_mm):
     return LipCrossings(FACE).find(mesh_mm).deepest_mm
-
-
-def test_jacobian_of_a_pinhole_is_that_of_any_camera():
-    points = np.random.default_rng(3).uniform(-40, 40, (50, 3))
-    turned = lip_patch.cameras()["left"]
-    like = replace(turned, model="OPENCV", params=(*turned.params, 0.0, 0.0, 0.0, 0.0))
-    expected = projection_jacobian(like, points)
-    np.testing.assert_allclose(projection_jacobian(turned, points), expected, atol=1e-5)
 
 
 def test_low_rank_update_is_the_minimum_of_the_whole_energy():

@@ -3,33 +3,21 @@
 import numpy as np
 
 from vermilion.errors import InputError
-from vermilion.faces.model import FaceModel
 from vermilion.frames import open_frames
 from vermilion.images import write_srgb8
-from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.photometric.choose import choose_frames
-from vermilion.photometric.frame_fit import FrameProblem
+from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
 from vermilion.photometric.overlay import appearance_picture
 from vermilion.photometric.samples import sample_skin
-from vermilion.photometric.settings import photometric_settings
 from vermilion.photometric.take import TakeStart, learn_appearance
-from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
 
 
 def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     inputs, cfg = snakemake.input, snakemake.params.cfg
     options = cfg["refinement.appearance"]
-    fit = TrackedTake.load(inputs.fit)
-    start = TakeStart.of(
-        FaceModel.load(inputs.tracker),
-        Identity.load(inputs.identity),
-        fit,
-        LandmarkTrack.load(list(inputs.landmarks)),
-        fit_settings(cfg["tracking.fit"], cfg["tracking.motion"]),
-    )
+    fit, _, start = TakeStart.load(inputs, cfg)
     rows = choose_frames(start.x, fit.valid, fit.reprojection_px, options["frames"])
     if len(rows) == 0:
         raise InputError(
@@ -41,7 +29,7 @@ def main(snakemake):
         )
     samples = sample_skin(start.model, options["spacing_mm"])
     face, source = start.face(samples), open_frames(snakemake.params.source, *place)
-    settings = photometric_settings(cfg["refinement.fit"])
+    settings = PhotometricSettings(**cfg["refinement.fit"])
     pictures = [source.read(fit.camera.name, int(fit.frames[row])) for row in rows]
     views = [
         start.view(row, picture, face, options["pixel_mm"], len(settings.iterations))

@@ -1,33 +1,20 @@
 """Pose and expression of each frame of a chunk from its picture."""
 
 from vermilion.arrays import write_arrays
-from vermilion.faces.model import FaceModel
 from vermilion.frames import open_frames
-from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.photometric.appearance import Appearance
-from vermilion.photometric.frame_fit import FrameProblem
-from vermilion.photometric.settings import photometric_settings
+from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
 from vermilion.photometric.take import TakeStart, refine_frames
-from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
 
 
 def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    fit, appearance = TrackedTake.load(inputs.fit), Appearance.load(inputs.appearance)
-    rows = fit.index_of(params.frames)
-    start = TakeStart.of(
-        FaceModel.load(inputs.tracker),
-        Identity.load(inputs.identity),
-        fit,
-        LandmarkTrack.load(inputs.landmarks),
-        fit_settings(cfg["tracking.fit"], cfg["tracking.motion"]),
-        rows,
-    )
+    appearance = Appearance.load(inputs.appearance)
+    fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
     face, source = start.face(appearance.samples), open_frames(params.source, *place)
-    settings = photometric_settings(cfg["refinement.fit"])
+    settings = PhotometricSettings(**cfg["refinement.fit"])
     problem = FrameProblem(face, appearance, settings, start.settings.weight_sigma)
     refined = refine_frames(
         start,

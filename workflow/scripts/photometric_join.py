@@ -1,25 +1,14 @@
 """The refined frames of a take, smooth over time, as the track that all later stages use."""
 
 from vermilion.evaluation.files import read_chunks
-from vermilion.faces.model import FaceModel
-from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.photometric.join import join_frames
 from vermilion.photometric.take import TakeStart
-from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
 
 
 def main(snakemake):
     inputs, cfg = snakemake.input, snakemake.params.cfg
-    fit = TrackedTake.load(inputs.fit)
-    start = TakeStart.of(
-        FaceModel.load(inputs.tracker),
-        Identity.load(inputs.identity),
-        fit,
-        LandmarkTrack.load(list(inputs.landmarks)),
-        fit_settings(cfg["tracking.fit"], cfg["tracking.motion"]),
-    )
+    fit, _, start = TakeStart.load(inputs, cfg)
     names = ["x", "matrix", "right", "refined"]
     found = read_chunks(list(inputs.chunks), [int(frame) for frame in fit.frames], names)
     x = join_frames(

@@ -9,7 +9,6 @@ import numpy as np
 from vermilion.camera import Camera
 from vermilion.correction.constraints import Rows
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.correction.picture import projection_jacobian
 from vermilion.features.rings import Ring
 
 #: A contour point this far off counts half (mm).
@@ -72,7 +71,7 @@ def contour_rows(
     """
     points_px, normals, known = lines
     world = samples.points(vertices_mm) @ rotation.T + translation_mm
-    across = np.einsum("mk,mkj->mj", normals, projection_jacobian(camera, world) @ rotation)
+    across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
     counts = weight * samples.length_mm / (1.0 + (off_mm / _ROBUST_MM) ** 2)

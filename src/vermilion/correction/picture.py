@@ -113,16 +113,3 @@ def _turning(rings_px: np.ndarray) -> np.ndarray:
     back, ahead = rings_px - np.roll(rings_px, 1, axis=1), np.roll(rings_px, -1, axis=1) - rings_px
     product = np.linalg.norm(back, axis=2) * np.linalg.norm(ahead, axis=2)
     return (back * ahead).sum(axis=2) < 0.3 * product
-
-
-def projection_jacobian(camera: Camera, points_mm: np.ndarray, step_mm: float = 0.05) -> np.ndarray:
-    """Derivative (..., 2, 3) px / mm of the projection at world points (..., 3)."""
-    if camera.is_pinhole:
-        local, k = camera.to_camera(points_mm), camera.calibration
-        x, y, z = (local[..., i, None] for i in range(3))
-        right, down, ahead = camera.rotation
-        columns = k[0, 0] * (right - x / z * ahead) / z, k[1, 1] * (down - y / z * ahead) / z
-        return np.stack(columns, axis=-2)
-    axes = step_mm * np.eye(3)
-    columns = [camera.project(points_mm + a) - camera.project(points_mm - a) for a in axes]
-    return np.stack(columns, axis=-1) / (2 * step_mm)

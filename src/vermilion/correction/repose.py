@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.correction.picture import projection_jacobian
+from vermilion.camera import Camera
 from vermilion.correction.rotations import rotation_matrix
 
 #: Landmarks that stay where they are in the picture: brows and eyes.
@@ -33,7 +33,7 @@ def repose_motion(
     lines: tuple[np.ndarray, np.ndarray, np.ndarray],
     pivot_mm: np.ndarray,
     unit_px: np.ndarray,
-    camera,
+    camera: Camera,
 ) -> np.ndarray:
     """Small motion (F, 6) in the world: rotation vector about the pivot (rad), shift (mm).
 
@@ -59,7 +59,7 @@ def repose_motion(
     for _ in range(_STEPS):
         world = moved(points, pivot_mm, motion)
         arm = world - (pivot_mm + motion[:, 3:])[:, None]
-        slope = projection_jacobian(camera, world) / unit[..., None, None]
+        slope = camera.pixel_jacobian(world) / unit[..., None, None]
         rows = np.concatenate([np.cross(arm[:, :, None], slope), slope], axis=3)
         seen = camera.project(world)
         off = (anchors_px - seen[:, :a]) / unit[..., None]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.tracking.observation import project, projection_jacobian
 from vermilion.tracking.pose import cross_matrix, rotation_of
 
 _LEAST_POINTS = 12
@@ -45,13 +46,10 @@ def rigid_motion(
     for _ in range(iterations):
         turned = arms @ rotation.T
         points = turned + centre + translation
-        z = points[:, 2:]
-        error = (points[:, :2] / z - moved_to) / sigma
+        error = (project(points, 1.0) - moved_to) / sigma
         weight = share / (1 + (error**2).sum(axis=1) / 9)
-        project = np.zeros((len(arms), 2, 3))
-        project[:, 0, 0] = project[:, 1, 1] = 1 / z[:, 0]
-        project[:, :, 2] = -points[:, :2] / z**2
-        jacobian = np.concatenate([-project @ cross_matrix(turned), project], axis=2) / sigma
+        slope = projection_jacobian(points, 1.0)
+        jacobian = np.concatenate([-slope @ cross_matrix(turned), slope], axis=2) / sigma
         hessian = np.einsum("n,nij,nik->jk", weight, jacobian, jacobian)
         gradient = np.einsum("n,nij,ni->j", weight, jacobian, error)
         hessian[5, 5] += depth_sigma_mm**-2

@@ -197,15 +197,11 @@ class _FrameView:
         Args:
             points_mm: (N, 3) head frame; basis_mm: (K, N, 3); wanted_px, across: (N, 2).
         """
-        local = self.camera.to_camera(points_mm @ self.rotation.T + self.translation_mm)
-        depth = local[:, 2]
-        focal = np.diag(self.camera.calibration)[:2]
-        turn = self.camera.rotation @ self.rotation
-        px_per_mm = focal.mean() / depth.mean()
-        # d pixel / d point of a pinhole; lens distortion is small over a mouth.
-        towards = across * focal / depth[:, None]
-        ray = np.column_stack([towards, -(towards * local[:, :2]).sum(axis=1) / depth])
-        matrix = np.einsum("knd,nd->nk", basis_mm, ray @ turn) / px_per_mm
+        world = points_mm @ self.rotation.T + self.translation_mm
+        depth = self.camera.to_camera(world)[:, 2]
+        px_per_mm = np.diag(self.camera.calibration)[:2].mean() / depth.mean()
+        ray = np.einsum("ni,nij->nj", across, self.camera.pixel_jacobian(world)) @ self.rotation
+        matrix = np.einsum("knd,nd->nk", basis_mm, ray) / px_per_mm
         right = ((wanted_px - self.project(points_mm)) * across).sum(axis=1) / px_per_mm
         return matrix, right
 

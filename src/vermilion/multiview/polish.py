@@ -13,7 +13,7 @@ import numpy as np
 from vermilion.mesh import vertex_normals
 from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.solver import ThinPlate, solve_displacement
-from vermilion.multiview.views import Frame, pixel_jacobian
+from vermilion.multiview.views import Frame
 from vermilion.raycast import RayCaster
 
 
@@ -55,7 +55,7 @@ def normal_offsets(
             ray = vertices_mm - origin
             ray /= np.linalg.norm(ray, axis=1, keepdims=True)
             slope = np.einsum(
-                "vij,vj->vi", pixel_jacobian(frame.views[target].camera, vertices_mm), ray
+                "vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray
             )
             square = np.maximum((slope * slope).sum(axis=1), 1e-9)
             along = (slope * motion.offset_px).sum(axis=1) / square

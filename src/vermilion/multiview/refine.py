@@ -16,7 +16,7 @@ from vermilion.mesh import vertex_normals
 from vermilion.multiview.motion import Measurements, Reference, cloud_planes, solve_motion
 from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.stereo import Cloud
-from vermilion.multiview.views import Frame, pixel_jacobian
+from vermilion.multiview.views import Frame
 from vermilion.raycast import RayCaster
 
 
@@ -122,7 +122,7 @@ def measure_frame(
                 min_agreement=min_agreement,
             )
         )
-        jacobians.append(pixel_jacobian(view.camera, vertices_mm))
+        jacobians.append(view.camera.pixel_jacobian(vertices_mm))
     measured = Measurements(
         np.array(jacobians),
         np.array([m.offset_px for m in motions]),

@@ -15,7 +15,7 @@ from vermilion.errors import InputError
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
 from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.views import Frame, pixel_jacobian, sample
+from vermilion.multiview.views import Frame, sample
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def follow(
         weight = weight / (1 + (at[:, 3] / (2 * settings.sigma_px)) ** 2)
         weights.append(np.where(seen.visible, weight * np.clip(seen.cosine, 0, 1), 0.0))
         offsets.append(at[:, :2].astype(np.float64))
-        jacobians.append(pixel_jacobian(view.camera, vertices_mm))
+        jacobians.append(view.camera.pixel_jacobian(vertices_mm))
     if not jacobians:  # no camera has both frames
         return vertices_mm
     measured = Measurements(np.array(jacobians), np.array(offsets), np.array(weights))

@@ -145,19 +145,6 @@ def load_frame(
     return Frame(number, views, missing)
 
 
-def pixel_jacobian(camera: Camera, points_mm: np.ndarray) -> np.ndarray:
-    """Change of the pixel by the world point, (N, 2, 3) px/mm; `camera` is a pinhole."""
-    k = camera.calibration
-    local = camera.to_camera(points_mm)
-    z = local[:, 2]
-    inner = np.zeros((len(points_mm), 2, 3))
-    inner[:, 0, 0] = k[0, 0] / z
-    inner[:, 1, 1] = k[1, 1] / z
-    inner[:, 0, 2] = -k[0, 0] * local[:, 0] / z**2
-    inner[:, 1, 2] = -k[1, 1] * local[:, 1] / z**2
-    return inner @ camera.rotation
-
-
 def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Bilinear values of (h, w) or (h, w, c) float32 at pixels (N, 2); borders repeated."""
     where = np.nan_to_num(pixels - 0.5).astype(np.float32).reshape(1, -1, 2)

@@ -21,6 +21,8 @@ from vermilion.photometric.samples import SurfaceSamples
 #: Mean linear albedo that skin is taken to have: scales light against albedo, which no picture tells.
 SKIN_ALBEDO = 0.35
 _ROUNDS = 4
+#: A colour this far off counts half (display values, 0 to 255).
+_ROBUST = 12.0
 
 
 @dataclass(frozen=True)
@@ -91,19 +93,19 @@ def estimate_appearance(
     skin = _middle(finest, trust)
     light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
     for _ in range(_ROUNDS):
-        shading = _shading(seen.normals, light)
+        shading = irradiance(seen.normals, light)
         skin = _middle(finest / shading, trust)
         albedo = _fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
     # No picture tells a bright light on dark skin from a dim one on fair skin, nor their colours:
     # the light on the face is white on the whole, the skin as bright as skin is.
     weight = trust / max(trust.sum(), 1e-12)
-    mean = np.einsum("mn,mnc->c", weight, _shading(seen.normals, light))
+    mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
     light = light / mean
-    skin = _middle(finest / _shading(seen.normals, light), trust)
+    skin = _middle(finest / irradiance(seen.normals, light), trust)
     light = light * (skin.mean() / SKIN_ALBEDO)
     skin = skin * (SKIN_ALBEDO / skin.mean())
-    shading = _shading(seen.normals, light)
+    shading = irradiance(seen.normals, light)
     albedo = np.stack(
         [
             _fit_albedo(seen.colours[:, level], shading, trust, skin, albedo_prior)
@@ -118,17 +120,13 @@ def estimate_appearance(
     )
 
 
-def _shading(normals: np.ndarray, light: np.ndarray) -> np.ndarray:
-    return irradiance(normals, light)
-
-
 def _middle(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
     """Median colour (3,) of what is well seen."""
     return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
 
 
-def _fit_light(basis, colours, trust, albedo, rounds: int = 8, limit: float = 12.0):
-    """(9, 3) by iteratively reweighted least squares; `limit`: a deviation that counts half."""
+def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
+    """(9, 3) by iteratively reweighted least squares."""
     seen = trust > 0
     rows, weights = basis[seen], trust[seen]
     values = colours[seen]
@@ -145,11 +143,11 @@ def _fit_light(basis, colours, trust, albedo, rounds: int = 8, limit: float = 12
             right = rows.T @ (w * albedos[:, c] * values[:, c])
             light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
         error = slope * (values - albedos * (rows @ light))
-        robust = 1.0 / (1.0 + (error / limit) ** 2)
+        robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
     return light
 
 
-def _fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4, limit: float = 12.0):
+def _fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4):
     """(N, 3) albedo under a known light, drawn to `skin` (3,) by `prior` frames' worth."""
     robust = np.ones_like(colours)
     level = (skin * shading.reshape(-1, 3).mean(axis=0)) ** 2 / skin**2
@@ -159,5 +157,5 @@ def _fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4, limit: fl
         albedo = top / ((weight * shading**2).sum(axis=0) + prior * level)
         albedo = np.maximum(albedo, 1e-3)
         error = to_display_values(colours) - to_display_values(albedo * shading)
-        robust = 1.0 / (1.0 + (error / limit) ** 2)
+        robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
     return albedo

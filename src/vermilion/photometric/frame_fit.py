@@ -9,6 +9,7 @@ Minimises, over the rotation, the translation and the weights w in [0, 1],
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +48,7 @@ class PhotometricSettings:
     translation_mm: float = 5.0
     depth_mm: float = 10.0
     weight: float = 0.2
-    iterations: tuple[int, ...] = (3, 3, 4)
+    iterations: Sequence[int] = (3, 3, 4)
     shading: bool = False
 
 

@@ -28,10 +28,7 @@ def join_frames(
         settings: what accelerations are typical.
     """
     n_params = start.shape[1]
-    typical = np.full(n_params, settings.weight_acceleration)
-    typical[:3] = np.radians(settings.rotation_acceleration_deg)
-    typical[3:N_POSE] = settings.translation_acceleration_mm
-    strength = (fps**2 / typical) ** 2
+    strength = settings.smoothness(n_params - N_POSE, fps)
     matrices, rights = matrices.copy(), rights.copy()
     matrices[~refined] = np.eye(n_params)
     rights[~refined] = start[~refined]

@@ -6,18 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.tracking.expression import N_POSE
-from vermilion.tracking.observation import (
-    Observations,
-    pose_jacobian,
-    project,
-    projection_jacobian,
-    robust_cost,
-    robust_weights,
-    whitening,
+from vermilion.tracking.expression import (
+    N_POSE,
+    FitSettings,
+    landmark_cost,
+    landmark_equations,
 )
+from vermilion.tracking.observation import Observations
 from vermilion.tracking.pose import rotation_of
-from vermilion.tracking.settings import FitSettings
 from vermilion.tracking.shape import LandmarkShape
 
 
@@ -56,30 +52,14 @@ class LandmarkTerm:
 
     def cost(self, x: np.ndarray, reference: np.ndarray) -> float:
         """Of unknowns x (6 + K): rotation vector about `reference` (3, 3), translation, weights."""
-        rotation = rotation_of(x[:3]) @ reference
-        points = self.shape.points(x[N_POSE:]) @ rotation.T + x[3:6]
-        _, residual = self._whitened(points[None])
-        return float(robust_cost(residual, self.settings.noise.robust_sigmas).sum())
+        points = self.shape.points(x[N_POSE:]) @ (rotation_of(x[:3]) @ reference).T + x[3:6]
+        return landmark_cost(points[None], self.seen, self.focal_px, self.sigma_px, self.settings)
 
     def normal_equations(
         self, x: np.ndarray, reference: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Gauss-Newton matrix (P, P) and gradient (P,) at x (P,)."""
-        turned, by_rotation = pose_jacobian(
-            x[None, :3], reference, self.shape.points(x[N_POSE:])[None]
+        matrix, gradient = landmark_equations(
+            self.shape, self.seen, self.focal_px, self.sigma_px, reference, x[None], self.settings
         )
-        points = turned + x[None, None, 3:6]
-        white, residual = self._whitened(points)
-        by_point = white @ projection_jacobian(points, self.focal_px)
-        by_head = by_point @ (rotation_of(x[:3]) @ reference)
-        by_weight = np.einsum("fnij,knj->fnik", by_head, self.shape.expressions_mm)
-        jacobian = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
-        jacobian = jacobian.reshape(-1, jacobian.shape[-1])
-        weight = np.repeat(robust_weights(residual, self.settings.noise.robust_sigmas)[0], 2)
-        weighted = jacobian * weight[:, None]
-        return weighted.T @ jacobian, weighted.T @ residual.reshape(-1)
-
-    def _whitened(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        image = project(points, self.focal_px)
-        white = whitening(image, self.sigma_px, self.seen.trust, self.settings.jaw_slide)
-        return white, (white @ (image - self.seen.image)[..., None])[..., 0]
+        return matrix[0], gradient[0]

@@ -11,6 +11,7 @@ over the surface: d is a smooth random field of deviation `sigma_mm`, alike over
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +45,7 @@ class LayerSettings:
     sigma: float = 6.0
     robust_sigmas: float = 2.0
     strength: float = 1000.0
-    iterations: tuple[int, ...] = (0, 1, 2)
+    iterations: Sequence[int] = (0, 1, 2)
 
 
 class CorrectiveLayer:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,8 +24,18 @@ from vermilion.tracking.expression import N_POSE, FitSettings
 from vermilion.tracking.observation import Observations, focal_px, project
 from vermilion.tracking.pose import rotation_of
 from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.settings import fit_settings
 from vermilion.tracking.shape import LandmarkShape
 from vermilion.tracking.start import in_chart
+
+
+class StartFiles(Protocol):
+    """Paths that a refinement starts from."""
+
+    tracker: str
+    identity: str
+    fit: str
+    landmarks: str | Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -71,6 +82,26 @@ class TakeStart:
         order = np.array([place[int(frame)] for frame in fit.frames[rows]], dtype=int)
         seen = Observations.of(track, camera)[order]
         return cls(model, identity, camera, x[rows], reference, seen, settings)
+
+    @classmethod
+    def load(
+        cls,
+        inputs: StartFiles,
+        cfg: Mapping[str, dict[str, Any]],
+        frames: Sequence[int] | None = None,
+    ) -> tuple[TrackedTake, np.ndarray, TakeStart]:
+        """(the take's track, rows of some frames in it, these frames): of files; all frames by default.
+
+        Args:
+            inputs: paths `tracker`, `identity`, `fit` and `landmarks` (one, or one a chunk).
+            cfg: sections `tracking.fit` and `tracking.motion`.
+        """
+        fit = TrackedTake.load(inputs.fit)
+        rows = np.arange(len(fit.frames)) if frames is None else fit.index_of(frames)
+        track = LandmarkTrack.load(inputs.landmarks)
+        settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+        model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
+        return fit, rows, cls.of(model, identity, fit, track, settings, rows)
 
     def face(self, samples: SurfaceSamples) -> SampledFace:
         """The person at some samples."""
@@ -152,6 +183,20 @@ def learn_appearance(
     return estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
 
 
+def readable(
+    valid: np.ndarray, read: Callable[[int], np.ndarray], name: str
+) -> Iterator[tuple[int, np.ndarray]]:
+    """(row, picture) of the valid rows (F,) bool; those that `read` cannot give are left out.
+
+    The capture stage has flagged them. Progress is reported under `name`.
+    """
+    for row in progress(np.flatnonzero(valid), name):
+        try:
+            yield row, read(row)
+        except InputError:
+            continue
+
+
 def refine_frames(
     start: TakeStart,
     valid: np.ndarray,
@@ -175,11 +220,7 @@ def refine_frames(
         "refined": np.zeros(n_frames, dtype=bool),
     }
     levels = len(problem.settings.iterations)
-    for row in progress(np.flatnonzero(valid), "photometric refinement"):
-        try:
-            picture = read(row)
-        except InputError:
-            continue  # flagged by the capture stage
+    for row, picture in readable(valid, read, "photometric refinement"):
         found = problem.solve(start.view(row, picture, problem.face, pixel_mm, levels))
         result["x"][row], result["matrix"][row] = found.x, found.matrix
         result["right"][row], result["refined"][row] = found.right, True

@@ -57,6 +57,13 @@ class FitSettings:
     iterations: int = 15
     tolerance_mm: float = 0.01
 
+    def smoothness(self, n_weights: int, fps: float) -> np.ndarray:
+        """(6 + K,) weights of squared second differences of pose and blend weights over time."""
+        typical = np.full(N_POSE + n_weights, float(self.weight_acceleration))
+        typical[:3] = np.radians(self.rotation_acceleration_deg)
+        typical[3:N_POSE] = self.translation_acceleration_mm
+        return (fps**2 / typical) ** 2
+
 
 @dataclass(frozen=True)
 class HeadMotion:
@@ -129,15 +136,7 @@ class _TakeProblem:
         self.second, self.first = self._smoothness(fps)
 
     def _smoothness(self, fps: float) -> tuple[np.ndarray, np.ndarray]:
-        s = self.settings
-        typical = np.concatenate(
-            [
-                np.full(3, np.radians(s.rotation_acceleration_deg)),
-                np.full(3, s.translation_acceleration_mm),
-                np.full(self.n_weights, s.weight_acceleration),
-            ]
-        )
-        strength = (fps**2 / typical) ** 2
+        strength = self.settings.smoothness(self.n_weights, fps)
         valid = self.seen.valid
         triples = valid[:-2] & valid[1:-1] & valid[2:]
         # Across gaps: straight lines, which cannot overshoot.
@@ -164,19 +163,10 @@ class _TakeProblem:
         points = self.shape.points(x[:, N_POSE:])
         return points @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
 
-    def _whitened(
-        self, points: np.ndarray, frames: slice
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        image = project(points, self.focal)
-        white = whitening(
-            image, self.sigma_px[frames], self.seen.trust[frames], self.settings.jaw_slide
-        )
-        residual = (white @ (image - self.seen.image[frames])[..., None])[..., 0]
-        return image, white, residual
-
     def cost(self, x: np.ndarray) -> float:
-        _, _, residual = self._whitened(self._camera_points(x), slice(None))
-        total = robust_cost(residual, self.settings.noise.robust_sigmas).sum()
+        total = landmark_cost(
+            self._camera_points(x), self.seen, self.focal, self.sigma_px, self.settings
+        )
         total += 0.5 * (self.prior * x**2).sum()
         total += 0.5 * (self.first * np.diff(x, axis=0) ** 2).sum()
         if self.n_frames > 2:
@@ -195,31 +185,13 @@ class _TakeProblem:
         blocks, right = [], []
         for begin in range(0, self.n_frames, _FRAMES_AT_ONCE):
             frames = slice(begin, min(begin + _FRAMES_AT_ONCE, self.n_frames))
-            jacobian, residual = self._linearised(x[frames], frames)
-            weight = np.repeat(
-                robust_weights(residual, self.settings.noise.robust_sigmas), 2, axis=1
-            )
-            flat = residual.reshape(len(residual), -1)
-            weighted = jacobian * weight[..., None]
-            block = np.swapaxes(weighted, 1, 2) @ jacobian
-            gradient = (flat[:, None] @ weighted)[:, 0]
+            block, gradient = landmark_equations(
+                self.shape, self.seen[frames], self.focal, self.sigma_px[frames], self.reference,
+                x[frames], self.settings,
+            )  # fmt: skip
             blocks.append(block)
             right.append((block @ x[frames][..., None])[..., 0] - gradient)
         return np.concatenate(blocks), np.concatenate(right)
-
-    def _linearised(self, x: np.ndarray, frames: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened residuals (F, 66, 2) and their Jacobian (F, 132, 6 + K)."""
-        turned, by_rotation = pose_jacobian(
-            x[:, :3], self.reference, self.shape.points(x[:, N_POSE:])
-        )
-        points = turned + x[:, None, 3:6]
-        _, white, residual = self._whitened(points, frames)
-        by_point = white @ projection_jacobian(points, self.focal)
-        rotation = out_of_chart(x[:, :3], self.reference)
-        by_head = by_point @ rotation[:, None]
-        by_weight = np.einsum("fnij,knj->fnik", by_head, self.shape.expressions_mm, optimize=True)
-        jacobian = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
-        return jacobian.reshape(len(x), -1, jacobian.shape[-1]), residual
 
     def largest_move_mm(self, a: np.ndarray, b: np.ndarray) -> float:
         return float(np.linalg.norm(self._camera_points(a) - self._camera_points(b), axis=-1).max())
@@ -230,3 +202,58 @@ class _TakeProblem:
         reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
         rotation = out_of_chart(x[:, :3], self.reference)
         return HeadMotion(rotation, x[:, 3:6].copy(), x[:, N_POSE:].copy(), reprojection)
+
+
+def landmark_cost(
+    points_mm: np.ndarray,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    settings: FitSettings,
+) -> float:
+    """Landmark term of the energy, the model's landmarks being at (F, 66, 3) in the camera frame."""
+    _, residual = _whitened(points_mm, seen, focal_px, sigma_px, settings)
+    return float(robust_cost(residual, settings.noise.robust_sigmas).sum())
+
+
+def landmark_equations(
+    shape: LandmarkShape,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    reference: np.ndarray,
+    x: np.ndarray,
+    settings: FitSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Newton matrices (F, P, P) and gradients (F, P) of the landmark term.
+
+    Args:
+        sigma_px: (F, 66).
+        reference: (3, 3), which the rotation vectors turn.
+        x: (F, P = 6 + K) rotation vector, translation, weights.
+    """
+    turned, by_rotation = pose_jacobian(x[:, :3], reference, shape.points(x[:, N_POSE:]))
+    points = turned + x[:, None, 3:6]
+    white, residual = _whitened(points, seen, focal_px, sigma_px, settings)
+    by_point = white @ projection_jacobian(points, focal_px)
+    by_head = by_point @ out_of_chart(x[:, :3], reference)[:, None]
+    by_weight = np.einsum("fnij,knj->fnik", by_head, shape.expressions_mm, optimize=True)
+    jacobian = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
+    jacobian = jacobian.reshape(len(x), -1, jacobian.shape[-1])
+    weight = np.repeat(robust_weights(residual, settings.noise.robust_sigmas), 2, axis=1)
+    weighted = jacobian * weight[..., None]
+    gradient = (residual.reshape(len(x), 1, -1) @ weighted)[:, 0]
+    return np.swapaxes(weighted, 1, 2) @ jacobian, gradient
+
+
+def _whitened(
+    points_mm: np.ndarray,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    settings: FitSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitening matrices (F, 66, 2, 2) and whitened residuals (F, 66, 2)."""
+    image = project(points_mm, focal_px)
+    white = whitening(image, sigma_px, seen.trust, settings.jaw_slide)
+    return white, (white @ (image - seen.image)[..., None])[..., 0]
