@@ -20,8 +20,8 @@ FACE_FILE = "mnv3_detection_opt.onnx"
 LANDMARK_FILE = "lm_model0_opt.onnx"
 
 _SIZE = 224
-_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
-_DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
+_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)[:, None, None]
+_DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)[:, None, None]
 
 
 @dataclass(frozen=True)
@@ -124,9 +124,10 @@ def _padded(box: np.ndarray, shape: tuple[int, ...]) -> tuple[int, int, int, int
 def _run(session, linear_rgb: np.ndarray) -> list[np.ndarray]:
     # Resized first: the cost does not grow with the picture.
     small = cv2.resize(linear_rgb, (_SIZE, _SIZE), interpolation=cv2.INTER_LINEAR)
-    small = linear_to_srgb(small)
-    tensor = ((small - _MEAN) / _DEVIATION).astype(np.float32).transpose(2, 0, 1)[None]
-    outputs = session.run(None, {session.get_inputs()[0].name: np.ascontiguousarray(tensor)})
+    planes = np.ascontiguousarray(linear_to_srgb(small).transpose(2, 0, 1))
+    planes -= _MEAN
+    planes /= _DEVIATION
+    outputs = session.run(None, {session.get_inputs()[0].name: planes[None]})
     return [output[0] for output in outputs]
 
 
