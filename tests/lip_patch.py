@@ -6,6 +6,8 @@ come the lips (vermilion), then skin. Its chart is polar, so that nothing overla
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 
@@ -15,7 +17,7 @@ from vermilion.faces.model import REGIONS, FaceModel
 from vermilion.images import srgb_to_linear
 from vermilion.inpaint.fields import sample
 from vermilion.mesh import normalised, vertex_normals
-from vermilion.raycast import RayCaster, interpolate
+from vermilion.raycast import RayCaster
 
 #: Opening (mm) and pucker of a few mouths.
 POSES = {"rest": (0.0, 0.0), "open": (7.0, 0.1), "pucker": (1.0, 1.0)}
@@ -89,6 +91,7 @@ def cameras() -> dict[str, Camera]:
     }
 
 
+@cache
 def albedo(tattoo: bool, seed: int = 5) -> np.ndarray:
     """Linear albedo over the whole chart (512, 512, 3); the tattoo reaches 1 mm past the lips."""
     rng = np.random.default_rng(seed)
@@ -115,13 +118,18 @@ def render(
     x, y = np.meshgrid(*(np.arange(n * over) + 0.5 for n in size))
     caster = RayCaster(vertices, model.triangles)
     hits = caster.cast(*camera.rays(np.stack([x, y], axis=-1) / over))
-    uv = interpolate(hits, model.triangles, model.uv.astype(float))
-    texel = np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1) * TEXTURE_PX
+    corners = model.triangles[hits.triangle[hits.hit]]
+    weights = hits.barycentric[hits.hit]
     normals = normalised(vertex_normals(vertices, model.triangles))
-    shade = 0.25 + 0.75 * np.clip(interpolate(hits, model.triangles, normals) @ LIGHT, 0, 1)
-    colour = sample(albedo(tattoo), texel) * (shade * light)[..., None]
-    colour = np.where(hits.hit[..., None], colour, 0.004)
-    return cv2.resize(colour.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    u, v, facing = (
+        (values[corners] * weights).sum(axis=1)
+        for values in (model.uv[:, 0], model.uv[:, 1], normals @ LIGHT)
+    )
+    shade = (0.25 + 0.75 * np.clip(facing, 0, 1)) * light
+    texel = np.stack([u, 1 - v], axis=-1) * TEXTURE_PX
+    colour = np.full((*hits.hit.shape, 3), 0.004, dtype=np.float32)
+    colour[hits.hit] = sample(albedo(tattoo), texel) * shade[:, None]
+    return cv2.resize(colour, size, interpolation=cv2.INTER_AREA)
 
 
 def psnr_db(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> float:

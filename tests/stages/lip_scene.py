@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
+from tests.heads import small_studio, small_tracker
 from vermilion.camera import look_at, pinhole
 from vermilion.faces.model import FaceModel
-from vermilion.faces.procedural import studio_model, tracker_model
 from vermilion.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.mesh import submesh
@@ -36,7 +36,7 @@ ACTIVE = (
 
 def models() -> tuple[FaceModel, FaceModel]:
     """(accurate model with expressions, coarse tracker model)."""
-    studio = studio_model(spacing_mm=2.4, n_identities=4)
+    studio = small_studio()
     keep = ~(studio.regions["teeth"] | studio.regions["eyes"])
     ids, triangles = submesh(studio.triangles, keep)
     renumber = np.full(studio.n_vertices, -1)
@@ -53,7 +53,7 @@ def models() -> tuple[FaceModel, FaceModel]:
         outer_contour=renumber[studio.outer_contour],
         inner_contour=renumber[studio.inner_contour],
     )
-    return accurate, tracker_model(2500, n_identities=4)
+    return accurate, small_tracker()
 
 
 def performance(model: FaceModel, seed: int) -> np.ndarray:

@@ -22,10 +22,10 @@ UNREADABLE = 4
 FRAMES = list(range(len(SHAPES)))
 CFG = {
     "contours.detector": {
-        "features": 400,
-        "variants": 2,
-        "max_samples": 6000,
-        "boosting": {"trees": 48, "features_per_tree": 64},
+        "features": 300,
+        "variants": 1,
+        "max_samples": 5000,
+        "boosting": {"trees": 40, "features_per_tree": 64},
     },
     "contours.maps": {},
     "features.shape": {},

@@ -54,11 +54,12 @@ def save_mixed(picture, name, folder, stem):
         write_image(folder / f"{stem}{'.exr' if name == 'left' else '.jpg'}", picture)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rig", "save", "limit_mm"),
     [
         pytest.param(mixed_rig, save_mixed, 0.2, id="mixed"),
-        pytest.param(wide_rig, None, 0.1, id="ten cameras", marks=pytest.mark.slow),
+        pytest.param(wide_rig, None, 0.1, id="ten cameras"),
     ],
 )
 def test_the_lips_are_found_with_any_rig(tmp_path, rig, save, limit_mm):

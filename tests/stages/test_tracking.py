@@ -9,7 +9,7 @@ from tests.stages.run_script import run_script
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
 from vermilion.camera import look_at, pinhole, write_cameras
-from vermilion.config.tracking import TrackingConfig
+from vermilion.config.tracking import MeshesConfig, TrackingConfig
 from vermilion.images import read_image, write_image
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.sequences import read_mesh, read_sequence
@@ -54,7 +54,7 @@ def run_stage(root, sizes, missing=()):
         LandmarkTrack(frames, points, np.full((size, 66), 0.9), valid).save(path)
         landmarks.append(path)
         chunks.append(frames)
-    cfg = TrackingConfig().model_dump(mode="json")
+    cfg = TrackingConfig(meshes=MeshesConfig(overlay_frames=2)).model_dump(mode="json")
     cfg = {f"tracking.{key}": value for key, value in cfg.items()}
     take = {"take": "t", "camera": "cam", "neutral": 0, "chunks": len(sizes)}
     names = {"subject": "s", "take": "t"}

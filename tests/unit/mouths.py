@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vermilion.contours.labels import ContourLabel, Polyline
 from vermilion.images import srgb_to_linear
@@ -60,6 +61,14 @@ def draw_mouth(
     landmarks[[63, 64, 65]] = inner[[75, 90, 105]]
     label = ContourLabel(Polyline(place(inner), True), Polyline(place(outer), True))
     return srgb_to_linear(np.clip(picture, 0, 1)), place(landmarks), label
+
+
+def crest(line_px, size=(240, 240), width_px=1.5, height=0.8) -> np.ndarray:
+    """Likelihood map (h, w) with a Gaussian crest on dense points (n, 2) of a contour."""
+    y, x = np.mgrid[: size[0], : size[1]] + 0.5
+    tree = cKDTree(line_px)
+    distance, _ = tree.query(np.stack([x, y], axis=-1), distance_upper_bound=8 * width_px)
+    return (height * np.exp(-0.5 * (distance / width_px) ** 2)).astype(np.float32)
 
 
 def mouth_model(opening=10.0, height=26.0, width=52.0, n=60):

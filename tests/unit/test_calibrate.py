@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -45,6 +47,7 @@ def board_poses(count: int, seed: int = 0) -> list[np.ndarray]:
     return poses
 
 
+@cache
 def board_picture(board: Board) -> np.ndarray:
     """The board at 8 pixels a millimetre, white all round it."""
     scale, (columns, rows) = 8, board.squares
@@ -149,7 +152,7 @@ def test_a_rig_with_free_distortion_measures_space(seen):
 
 def test_a_checkerboard_rig_is_recovered():
     truth = {name: camera for name, camera in make_rig().items() if name != "right"}
-    seen = views_of(CHECKERS, truth, 12)
+    seen = views_of(CHECKERS, truth, 8)
     sizes = dict.fromkeys(truth, SIZE)
     result = calibrate_rig(CHECKERS, seen, sizes, "mid", "PINHOLE", True)
     assert result.reprojection_px < 0.2

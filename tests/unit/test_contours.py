@@ -21,10 +21,10 @@ from vermilion.contours.training import LabelledFrame, TrainingSettings, train_d
 from vermilion.errors import InputError, ModelFileError
 
 SMALL = TrainingSettings(
-    n_features=400,
-    variants=2,
-    max_samples=6000,
-    boosting=BoostingSettings(n_trees=48, features_per_tree=64),
+    n_features=300,
+    variants=1,
+    max_samples=5000,
+    boosting=BoostingSettings(n_trees=40, features_per_tree=64),
 )
 
 

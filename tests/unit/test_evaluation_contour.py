@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.heads import small_tracker
 from vermilion.camera import look_at, pinhole
 from vermilion.correction.layers import correction_layers
 from vermilion.evaluation.contour_tracker import ContourTracker, FoundContours
 from vermilion.evaluation.lip_shapes import LipShapes, medoids
-from vermilion.faces.procedural import tracker_model
 from vermilion.features.rings import lip_rings
 
 FRONT = np.array([0.0, 0.0, 1.0])
@@ -17,7 +17,7 @@ FRONT = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def model():
-    return tracker_model(2500, n_identities=2)
+    return small_tracker()
 
 
 def test_medoids_stand_for_their_clusters_and_the_neutral_needs_none():

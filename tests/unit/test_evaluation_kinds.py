@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.heads import small_studio
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.kind_errors import kind_rows, sums_of_kinds
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import KINDS, kinds_of_curves, kinds_of_shapes
-from vermilion.faces.procedural import studio_model
 
 POSES = {
     "kiss": {"mouthPucker": 0.6, "jawOpen": 0.05},
@@ -23,7 +23,7 @@ POSES = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_curves_and_shapes_tell_the_same_kind(kind):
-    model = studio_model(spacing_mm=2.4, n_identities=0)
+    model = small_studio()
 
     def mesh(curves):
         weights = [curves.get(name, 0.0) for name in model.expression_names]

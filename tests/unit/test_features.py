@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.unit.mouths import draw_mouth, facing_camera, mouth_model
-from vermilion.contours.labels import distance_to
+from tests.unit.mouths import crest, draw_mouth, facing_camera, mouth_model
 from vermilion.errors import InputError
 from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
@@ -19,13 +18,10 @@ from vermilion.mesh import vertex_areas
 OUTER_WIDTH = NAMES.index("outer_width")
 
 
-def ridge_maps(label, size=(240, 240), width_px=1.5, height=0.8):
+def ridge_maps(label, size=(240, 240), width_px=1.5):
     """Likelihood maps (inner, outer) with a Gaussian crest on the label's contours."""
-    maps = []
-    for line in (label.inner, label.outer):
-        distance = distance_to(line.dense(0.1), max(size))[: size[0], : size[1]]
-        maps.append((height * np.exp(-0.5 * (distance / width_px) ** 2)).astype(np.float32))
-    return tuple(maps)
+    lines = (label.inner, label.outer)
+    return tuple(crest(line.dense(0.1), size, width_px) for line in lines)
 
 
 def sampler(model, **settings):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from tests.unit.mouths import ellipse, facing_camera, mouth_model
+from tests.unit.mouths import crest, ellipse, facing_camera, mouth_model
 from vermilion.features.contour_features import ContourSampler
 from vermilion.features.distances import NAMES
 from vermilion.features.search import SearchSettings
@@ -32,45 +32,38 @@ def true_mouth(opening, height, width):
     return [on_dental_arch((ring - middle) * [1, -1]) for ring in rings]
 
 
-def ridge(line):
-    """Likelihood map (h, w) with a Gaussian crest on a dense polyline (n, 2) px."""
-    distance, _ = cKDTree(line).query(CAMERA.pixel_grid(), distance_upper_bound=8 * PX_A_MM)
-    return (0.8 * np.exp(-0.5 * (distance / (1.5 * PX_A_MM)) ** 2)).astype(np.float32)
-
-
 def coarse_model():
     """A coarse mouth that is too low and too narrow, on the same arch."""
     model = mouth_model(6.0, 22.0, 49.0)
     return replace(model, neutral_mm=on_dental_arch(model.neutral_mm[:, :2]))
 
 
-def distances(mouth, turn, space):
-    """The twenty distances of a mouth whose head has turned by a rotation (3, 3)."""
-    maps = [ridge(CAMERA.project(ring @ turn.T)) for ring in mouth]
+@cache
+def distances(mouth, axis="x", degrees=0):
+    """Space -> the twenty distances of a mouth whose head has turned about an axis."""
+    turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+    rings = [CAMERA.project(ring @ turn.T) for ring in true_mouth(*mouth)]
+    maps = [crest(ring, SIZE, 1.5 * PX_A_MM) for ring in rings]
     model = coarse_model()
     sampler = ContourSampler.of(model, 80, SearchSettings())
-    pose = (turn, np.zeros(3)) if space == "head" else None
-    found = sampler.find(model.neutral_mm @ turn.T, CAMERA, maps, pose)
-    assert found.outer_found.mean() > 0.9
-    return found.distances
+    found = {}
+    for space, pose in (("head", (turn, np.zeros(3))), ("image", None)):
+        contours = sampler.find(model.neutral_mm @ turn.T, CAMERA, maps, pose)
+        assert contours.outer_found.mean() > 0.9
+        found[space] = contours.distances
+    return found
 
 
 @pytest.mark.parametrize("mouth", [(9.0, 26.0, 52.0), (16.0, 30.0, 44.0)], ids=["open", "rounded"])
 @pytest.mark.parametrize("turn", TURNS)
 def test_a_turn_of_the_head_changes_no_distance_in_the_head_frame(turn, mouth):
-    axis, degrees = TURNS[turn]
-    turned = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
-    rings = true_mouth(*mouth)
-    change = {}
-    for space in ("head", "image"):
-        facing, seen = (distances(rings, pose, space) for pose in (np.eye(3), turned))
-        # Lips of a few pixels are measured to a fifth of a pixel, not to a share of their width.
-        change[space] = np.abs(seen - facing) / np.maximum(facing, 0.1)
+    facing, seen = distances(mouth), distances(mouth, *TURNS[turn])
+    # Lips of a few pixels are measured to a fifth of a pixel, not to a share of their width.
+    change = {s: np.abs(seen[s] - facing[s]) / np.maximum(facing[s], 0.1) for s in seen}
     assert change["head"].max() < 0.02, dict(zip(NAMES, change["head"].round(3), strict=True))
     assert change["image"].max() > 2 * change["head"].max()
 
 
 def test_facing_the_camera_both_spaces_agree_but_for_perspective():
-    rings = true_mouth(9.0, 26.0, 52.0)
-    head, image = (distances(rings, np.eye(3), space) for space in ("head", "image"))
-    np.testing.assert_allclose(head, image, rtol=0.06, atol=0.003)
+    found = distances((9.0, 26.0, 52.0))
+    np.testing.assert_allclose(found["head"], found["image"], rtol=0.06, atol=0.003)

@@ -9,7 +9,7 @@ from vermilion.faces.contours import INNER_LOOP, LEFT_CORNER, OUTER_LOOP, RIGHT_
 from vermilion.faces.ict_archive import check_archive, read_ict
 from vermilion.mesh import boundary_edges, triangle_areas, unique_edges
 
-pytestmark = pytest.mark.data
+pytestmark = [pytest.mark.data, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

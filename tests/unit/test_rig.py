@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.heads import small_tracker
 from vermilion.camera import read_cameras, write_cameras
-from vermilion.faces.procedural import tracker_model
 from vermilion.studio import rig
 
 
 @pytest.fixture(scope="module")
 def face():
-    return tracker_model(n_triangles=2500)
+    return small_tracker()
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from tests.heads import small_tracker
 from vermilion.errors import InputError
 from vermilion.faces.procedural import tracker_model
 from vermilion.landmarks.detector import Landmarks
@@ -26,7 +27,7 @@ from vermilion.scan.transfer import DeformationTransfer
 
 @pytest.fixture(scope="module")
 def generic():
-    return tracker_model(2500, 4)
+    return small_tracker()
 
 
 def person(generic):
@@ -212,7 +213,8 @@ class Blind:
         return Landmarks.none()
 
 
-def test_a_scan_without_a_face_is_said_so(generic):
+def test_a_scan_without_a_face_is_said_so(generic, monkeypatch):
+    monkeypatch.setattr("vermilion.scan.landmarks._SIZE_PX", 48)  # whoever is blind needs no more
     ball = trimesh.creation.icosphere(subdivisions=4)
     mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))
     with pytest.raises(InputError, match="subject anna: found no face in 24 views"):

@@ -10,17 +10,17 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.tattoo import feathered, tattoo_mask
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def model():
     return lip_patch.face_model()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def domain(model):
     return lip_domain(model, skin_mm=9.0, inner_mm=4.0, texel_mm=0.3)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def textures(model, domain):
     """Plain and tattooed neutral from all cameras, tattooed neutral from the front."""
     rest, rig = model.neutral_mm, lip_patch.cameras()
@@ -32,7 +32,7 @@ def textures(model, domain):
     return baked(False, rig), baked(True, rig), baked(True, ["front"])
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def opacity(domain, textures):
     mask = tattoo_mask(domain, textures[1], textures[0], reach_mm=4.0, sensitivity=6.0)
     return feathered(domain, mask, border_mm=0.6, feather_mm=1.0)
