@@ -38,7 +38,8 @@ def chunks_around(pattern):
     """Input function: `pattern` for the chunks with a frame that the wildcards' chunk depends on."""
 
     def files(wildcards):
-        frames, reach = frames_in(wildcards.chunk), CONFIG.correction.picture.reach_frames
+        frames = frames_in(wildcards.chunk)
+        reach = CONFIG.correction.reach_frames(take_of(wildcards).fps)
         near = [
             chunk
             for chunk in chunks(wildcards.subject, wildcards.take)

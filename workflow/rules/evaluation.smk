@@ -75,6 +75,7 @@ rule evaluate:
         code=code_of("evaluate"),
         frames=lambda wildcards: take_of(wildcards).test_frames(),
         first=lambda wildcards: take_of(wildcards).first,
+        fps=lambda wildcards: take_of(wildcards).fps,
     script:
         "../scripts/evaluate.py"
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vermilion.config.apply import OverlayConfig
-from vermilion.config.correction import PictureConfig
+from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.apply import correct_sequence
 from vermilion.correction.picture import (
     PICTURE_ARRAYS,
@@ -41,8 +41,10 @@ def main(snakemake):
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
     tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
     identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
-    settings = PictureConfig(**params.cfg["correction.picture"])
-    near = frames_around(frames, frames_of(inputs.coarse), settings.reach_frames)
+    settings = CorrectionConfig(
+        integration=params.cfg["correction.integration"], picture=params.cfg["correction.picture"]
+    )
+    near = frames_around(frames, frames_of(inputs.coarse), settings.reach_frames(params.fps))
     given = read_chunks(inputs.features, near, ["features", *PICTURE_ARRAYS])
     features = np.where(given["valid"][:, None], given["features"], np.nan)
     coarse = np.asarray(read_frames(inputs.coarse, near), dtype=np.float64)
@@ -55,7 +57,8 @@ def main(snakemake):
     )
     corrected = correct_sequence(
         model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
-        features, valid=fit.valid[rows], **params.cfg["correction.integration"], picture=picture,
+        features, valid=fit.valid[rows], frames=near, picture=picture,
+        **settings.integration.at(params.fps),
     )  # fmt: skip
     asked = np.searchsorted(near, frames)
     coarse, corrected, features, rows = (a[asked] for a in (coarse, corrected, features, rows))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.config.correction import PictureConfig
+from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
 from vermilion.correction.picture import (
     PICTURE_ARRAYS,
@@ -80,19 +80,20 @@ def true_curves(snakemake, frames):
     return [curves[frame - snakemake.params.first] for frame in frames]
 
 
-def coarse_take(inputs, tracker, fit, frames, cfg):
+def coarse_take(inputs, tracker, fit, frames, correction, fps):
     """The coarse track at the frames, with its features and what was found in the picture."""
     rows = fit.index_of(frames)
     features = read_chunks(inputs.features, frames, ["features", *PICTURE_ARRAYS])
-    settings = PictureSettings(**cfg["correction.picture"])
+    settings = PictureSettings(**correction.picture.model_dump())
     return CoarseTake(
+        frames,
         np.asarray(read_frames(inputs.coarse, frames), dtype=np.float64),
         tracker.triangles,
         Identity.load(inputs.identity).neutral_mm,
         fit.world_from_head_rotation[rows],
         fit.world_from_head_translation_mm[rows],
         np.where(features["valid"][:, None], features["features"], np.nan),
-        **cfg["correction.integration"],
+        **correction.integration.at(fps),
         picture=Picture.of(tracker, fit.camera, frames, features, settings),
     )
 
@@ -119,12 +120,13 @@ def main(snakemake):
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    reach = PictureConfig(**cfg["correction.picture"]).reach_frames
-    near = frames_around(frames, fit.frames, reach)  # what the result of a frame depends on
-    around, asked_of_near = (
-        coarse_take(inputs, tracker, fit, near, cfg),
-        np.searchsorted(near, frames),
+    correction = CorrectionConfig(
+        integration=cfg["correction.integration"], picture=cfg["correction.picture"]
     )
+    fps = snakemake.params.fps
+    near = frames_around(frames, fit.frames, correction.reach_frames(fps))
+    around = coarse_take(inputs, tracker, fit, near, correction, fps)
+    asked_of_near = np.searchsorted(near, frames)
     take = around[asked_of_near]
 
     sequences, true = {"base": take.coarse_mm}, None

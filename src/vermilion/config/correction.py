@@ -51,6 +51,23 @@ class IntegrationConfig(StageConfig):
         description="Detail finer than this comes from the layers, the place of the mesh over longer "
         "ranges from regressed displacements (mm). 0: layers alone, as in the paper.",
     )
+    smooth_s: float = Field(
+        0.1,
+        ge=0.0,
+        le=1.0,
+        description="What is regressed for a frame is the middle of a parabola fitted over so many seconds "
+        "to either side (3 frames at 30 a second, none below 20): noise of single frames goes, nothing "
+        "comes late. 0: every frame for itself, as in the paper.",
+    )
+
+    def at(self, fps: float) -> dict[str, float | int]:
+        """Arguments of the integration of a take: `seam_mm`, `detail_mm`, `smooth_frames`."""
+        frames = round(self.smooth_s * fps)
+        return {
+            "seam_mm": self.seam_mm,
+            "detail_mm": self.detail_mm,
+            "smooth_frames": frames if frames > 1 else 0,
+        }
 
 
 class PictureConfig(StageConfig):
@@ -83,7 +100,7 @@ class PictureConfig(StageConfig):
 
     @property
     def reach_frames(self) -> int:
-        """Frames to either side that the result of a frame depends on."""
+        """Frames to either side whose corrected meshes the result of a frame depends on."""
         return math.ceil(3 * self.repose_frames) if self.repose else 0
 
 
@@ -97,3 +114,7 @@ class CorrectionConfig(StageConfig):
     picture: PictureConfig = Field(
         default_factory=PictureConfig, description="Agreeing with the picture."
     )
+
+    def reach_frames(self, fps: float) -> int:
+        """Frames to either side whose features the result of a frame depends on."""
+        return self.picture.reach_frames + self.integration.at(fps)["smooth_frames"]

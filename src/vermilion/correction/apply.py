@@ -1,13 +1,14 @@
 """Corrected meshes of a take: the interface for evaluation, application and propagation.
 
     corrected = correct_sequence(model, coarse_mm, triangles, neutral_mm, rotation, translation_mm,
-                                 features, valid=valid, seam_mm=16.0, detail_mm=15.0)  # (F, V, 3), mm
+                                 features, valid=valid, seam_mm=16.0, detail_mm=15.0,
+                                 smooth_frames=3)  # (F, V, 3), mm
 
 `model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
 **C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
 `neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`): it sets the weights
 of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are
-those of the take. For known layers and displacements (the oracle):
+those of the take. With `smooth_frames` what is regressed is made coherent over time (`coherence`). For known layers and displacements (the oracle):
 
     corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
                                     translation_mm, valid=valid, seam_mm=16.0,
@@ -22,6 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.correction.coherence import smoothed_over_time
 from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.picture import Picture
@@ -39,18 +41,25 @@ class Corrector:
         triangles: np.ndarray,
         seam_mm: float = 16.0,
         detail_mm: float = 0.0,
+        smooth_frames: int = 0,
     ):
         model.check_topology(triangles)
-        self.model = model
+        self.model, self.smooth_frames = model, smooth_frames
         detail_mm = detail_mm if len(model.vertices) else 0.0
         self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm, detail_mm)
         layers, displacements_mm = model.basis(np.asarray(neutral_mm, dtype=np.float64))
         self._basis = np.ascontiguousarray(layers.T, dtype=np.float32)
         self._places = self.integrator.weighted_places(displacements_mm) if detail_mm else None
 
-    def correct(self, coarse_mm: np.ndarray, features: np.ndarray) -> np.ndarray:
-        """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame."""
-        mixture = self.model.mixture(features)
+    def correct(
+        self, coarse_mm: np.ndarray, features: np.ndarray, frames: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame.
+
+        `frames` (F,) are their numbers, ascending; None: they follow each other.
+        """
+        frames = np.arange(len(features)) if frames is None else frames
+        mixture = smoothed_over_time(self.model.mixture(features), frames, self.smooth_frames)
         one = np.ones((len(mixture), 1))
         return self.integrator.integrate_mixture(
             coarse_mm, np.concatenate([mixture, one], axis=1), self._basis, self._places
@@ -69,20 +78,25 @@ def correct_sequence(
     valid: np.ndarray | None = None,
     seam_mm: float = 16.0,
     detail_mm: float = 0.0,
+    smooth_frames: int = 0,
+    frames: np.ndarray | None = None,
     picture: Picture | None = None,
 ) -> np.ndarray:
     """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
 
+    `frames` (F,) are their numbers, ascending; None: they follow each other.
+
     Raises ModelFileError where the mesh is not the one that the regressor was trained on.
     """
-    corrector = Corrector(model, neutral_mm, triangles, seam_mm, detail_mm)
+    corrector = Corrector(model, neutral_mm, triangles, seam_mm, detail_mm, smooth_frames)
     usable = np.isfinite(features).all(axis=1) & np.isfinite(coarse_mm).all(axis=(1, 2))
     if valid is not None:
         usable &= valid
+    frames = np.arange(len(features)) if frames is None else np.asarray(frames)
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
     return _in_world(
-        corrector.integrator, corrector.correct(head, features[usable]), usable, coarse_mm,
-        neutral_mm, rotation, translation_mm, picture,
+        corrector.integrator, corrector.correct(head, features[usable], frames[usable]), usable,
+        coarse_mm, neutral_mm, rotation, translation_mm, picture,
     )  # fmt: skip
 
 

@@ -20,13 +20,15 @@ class CoarseTake:
     """The coarse track of some frames.
 
     Attributes:
+        frames: (F,) frame numbers, ascending.
         coarse_mm: (F, V, 3) world; triangles: (T, 3); neutral_mm: (V, 3) of the subject.
         rotation, translation_mm: `world_from_head`, (F, 3, 3) and (F, 3).
         features: (F, M); NaN where a frame has none.
-        seam_mm, detail_mm: of the integration.
+        seam_mm, detail_mm, smooth_frames: of the integration.
         picture: of the same frames; None for the paper, which has no such thing.
     """
 
+    frames: np.ndarray
     coarse_mm: np.ndarray
     triangles: np.ndarray
     neutral_mm: np.ndarray
@@ -35,17 +37,18 @@ class CoarseTake:
     features: np.ndarray
     seam_mm: float
     detail_mm: float = 0.0
+    smooth_frames: int = 0
     picture: Picture | None = None
 
     def __getitem__(self, rows: np.ndarray) -> CoarseTake:
         """The same of some frames."""
-        names = ("coarse_mm", "rotation", "translation_mm", "features")
+        names = ("frames", "coarse_mm", "rotation", "translation_mm", "features")
         picture = None if self.picture is None else self.picture[rows]
         return replace(self, **{name: getattr(self, name)[rows] for name in names}, picture=picture)
 
     def as_in_paper(self) -> CoarseTake:
-        """Without the picture, which Lips16 leaves to future work."""
-        return replace(self, picture=None)
+        """Without the picture, which Lips16 leaves to future work, each frame by itself."""
+        return replace(self, picture=None, smooth_frames=0)
 
 
 def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
@@ -53,20 +56,24 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
 
     The factorisation, once a person, is not in the time. Frames without features stay as they are.
     """
-    corrector = Corrector(model, take.neutral_mm, take.triangles, take.seam_mm, take.detail_mm)
+    corrector = Corrector(
+        model, take.neutral_mm, take.triangles, take.seam_mm, take.detail_mm, take.smooth_frames
+    )
     usable = np.isfinite(take.features).all(axis=1)
     pose = take.rotation[usable], take.translation_mm[usable]
     corrected = np.array(take.coarse_mm, dtype=np.float64)
     if not usable.any():
         return corrected, np.nan
-    coarse, features, fit = corrected[usable], take.features[usable], None
+    coarse, features, frames = corrected[usable], take.features[usable], take.frames[usable]
+    fit = None
     if take.picture is not None and take.picture.settings.used:
         fit = PictureFit.of(corrector.integrator, take.neutral_mm, take.picture)
         picture = take.picture[usable]
 
     def correct(rows: slice) -> np.ndarray:
         of_rows = pose[0][rows], pose[1][rows]
-        head = corrector.correct(head_from_world(coarse[rows], *of_rows), features[rows])
+        head = head_from_world(coarse[rows], *of_rows)
+        head = corrector.correct(head, features[rows], frames[rows])
         if fit is None:
             return world_from_head(head, *of_rows)
         return fit.fit(head, coarse[rows], *of_rows, picture[rows])

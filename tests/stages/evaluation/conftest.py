@@ -139,7 +139,7 @@ def evaluate(root, name, truth):
     run_script(
         "evaluate",
         wildcards={"subject": SUBJECT, "take": "rom"},
-        params={"cfg": CFG, "frames": [BAD_FRAME, *TEST], "first": 0},
+        params={"cfg": CFG, "frames": [BAD_FRAME, *TEST], "first": 0, "fps": 25.0},
         input=inputs,
         output={
             "sums": out / "sums.npz",
