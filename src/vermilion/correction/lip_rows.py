@@ -10,6 +10,7 @@ from vermilion.camera import Camera
 from vermilion.correction.constraints import Rows
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.features.rings import Ring
+from vermilion.mesh_points import MeshPoints
 
 #: A contour point this far off counts half (mm).
 _ROBUST_MM = 2.5
@@ -24,33 +25,26 @@ class LipSamples:
     """Samples on both contours of a mesh, the outer ring first.
 
     Attributes:
-        vertices: (m, 2); coefficients: (m, 2).
+        points: m of them, on edges.
         length_mm: (m,) of contour that each stands for, on the person's neutral.
     """
 
-    vertices: np.ndarray
-    coefficients: np.ndarray
+    points: MeshPoints
     length_mm: np.ndarray
 
     @classmethod
     def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
-        rings = (outer, inner)
+        """Of both rings of a face, with lengths on a person's neutral (V, 3)."""
         lengths = []
-        for ring in rings:
+        for ring in (outer, inner):
             points = ring.points(neutral_mm)
             steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
             lengths.append(np.full(len(ring), steps.mean()))
-        return cls(
-            np.concatenate([np.stack([ring.start, ring.end], axis=1) for ring in rings]),
-            np.concatenate(
-                [np.stack([1 - ring.fraction, ring.fraction], axis=1) for ring in rings]
-            ),
-            np.concatenate(lengths),
+        places = (
+            np.concatenate([getattr(ring, name) for ring in (outer, inner)])
+            for name in ("start", "end", "fraction")
         )
-
-    def points(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """Samples (..., m, 3) on meshes (..., V, 3)."""
-        return (vertices_mm[..., self.vertices, :] * self.coefficients[..., None]).sum(axis=-2)
+        return cls(MeshPoints.on_edges(*places), np.concatenate(lengths))
 
 
 def contour_rows(
@@ -70,14 +64,14 @@ def contour_rows(
         weight: of a millimetre of contour.
     """
     points_px, normals, known = lines
-    world = samples.points(vertices_mm) @ rotation.T + translation_mm
+    world = samples.points.of(vertices_mm) @ rotation.T + translation_mm
     across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
     counts = weight * samples.length_mm / (1.0 + (off_mm / _ROBUST_MM) ** 2)
     rows = Rows(
-        samples.vertices, samples.coefficients, across / px_per_mm[:, None], off_mm, 1.0 / counts,
-        np.zeros(len(off_mm), dtype=bool),
+        samples.points.vertices, samples.points.weights, across / px_per_mm[:, None], off_mm,
+        1.0 / counts, np.zeros(len(off_mm), dtype=bool),
     )  # fmt: skip
     return rows[known & np.isfinite(off_mm)]
 
@@ -106,14 +100,11 @@ def touch_rows(
     lower = n - upper
     apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
     closed = (apart < CLOSED) & known[upper] & known[lower]
-    upper, lower = (
-        len(samples.vertices) - n + upper[closed],
-        len(samples.vertices) - n + lower[closed],
-    )
-    vertices = np.concatenate([samples.vertices[upper], samples.vertices[lower]], axis=1)
-    coefficients = np.concatenate(
-        [samples.coefficients[upper], -samples.coefficients[lower]], axis=1
-    )
+    inner = len(samples.points) - n  # where the inner ring begins
+    upper, lower = inner + upper[closed], inner + lower[closed]
+    above, below = samples.points[upper], samples.points[lower]
+    vertices = np.concatenate([above.vertices, below.vertices], axis=1)
+    coefficients = np.concatenate([above.weights, -below.weights], axis=1)
     vertical = np.array([0.0, 1.0, 0.0]) - view[1] * view
     axes = np.stack([view, vertical / np.linalg.norm(vertical)])
     directions = np.repeat(axes, len(upper), axis=0)

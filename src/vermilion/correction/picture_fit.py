@@ -47,7 +47,7 @@ class PictureFit:
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
         self._crossings = LipCrossings(face)
-        named = np.union1d(self._samples.vertices, self._crossings.vertices)
+        named = np.union1d(self._samples.points.vertices, self._crossings.vertices)
         self._solver = ConstraintSolver(integrator, named)
 
     @classmethod
@@ -99,7 +99,7 @@ class PictureFit:
         motion = repose_motion(
             corrected[:, self._anchors] @ turn + translation_mm[:, None],
             picture.camera.project(coarse_mm[:, self._anchors]),
-            self._samples.points(corrected) @ turn + translation_mm[:, None],
+            self._samples.points.of(corrected) @ turn + translation_mm[:, None],
             lines, pivot, unit_px, picture.camera,
         )  # fmt: skip
         known = lines[2].mean(axis=1) >= _LEAST_KNOWN

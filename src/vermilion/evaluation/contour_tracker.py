@@ -22,8 +22,9 @@ from vermilion.camera import Camera
 from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.evaluation.lips import lip_sides
 from vermilion.faces.model import FaceModel
-from vermilion.features.rings import Ring, lip_rings
+from vermilion.features.rings import lip_rings
 from vermilion.features.search import inward_normals, smoothed_ring
+from vermilion.mesh_points import MeshPoints
 
 _ROUNDS = 8
 _SUBDIVISIONS = 5
@@ -45,20 +46,6 @@ class FoundContours:
     inner_found: np.ndarray
 
 
-@dataclass(frozen=True)
-class SurfaceSamples:
-    """Points on triangles: corners (N, 3) vertex ids, weights (N, 3), side (N,) of the lips."""
-
-    corners: np.ndarray
-    weights: np.ndarray
-    side: np.ndarray
-
-    def of(self, field: np.ndarray, rows: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Values at the points of a field (..., V, 3), (..., N, 3)."""
-        at = field[..., self.corners[rows], :]
-        return np.einsum("nk,...nkd->...nd", self.weights[rows], at)
-
-
 class ContourTracker:
     """A person's tracker with lip shapes; build it once.
 
@@ -78,8 +65,9 @@ class ContourTracker:
         ).astype(np.float64)
         size = (self.displacements_mm[:, lips] ** 2).sum(axis=2).mean(axis=1)
         self.penalty = np.sqrt(ridge * size)
-        self.outer = _ring_samples(lip_rings(model, n_samples)[0])
-        self.lips = _lip_samples(model)
+        ring = lip_rings(model, n_samples)[0]
+        self.outer = MeshPoints.on_edges(ring.start, ring.end, ring.fraction)
+        self.lips, self.sides = _lip_points(model)
 
     def track(
         self,
@@ -116,22 +104,20 @@ class ContourTracker:
         weights = np.zeros(len(self.displacements_mm))
         if found.outer_found[f].sum() < _LEAST_POINTS:
             return weights
-        outer = np.flatnonzero(found.outer_found[f])
-        across = inward_normals(smoothed_ring(found.outer_px[f], 2))[outer]
-        outer_basis = self.outer.of(self.displacements_mm, outer)
+        seen = found.outer_found[f]
+        across = inward_normals(smoothed_ring(found.outer_px[f], 2))[seen]
+        outer = self.outer[seen]
+        outer_basis = outer.of(self.displacements_mm)
         for _ in range(_ROUNDS):
             mesh = base_mm + np.tensordot(weights, self.displacements_mm, 1)
-            parts = [
-                view.equations(
-                    self.outer.of(mesh, outer), outer_basis, found.outer_px[f, outer], across
-                )
-            ]
-            inner, points, up = self._occluding(view, mesh, found, f)
+            parts = [view.equations(outer.of(mesh), outer_basis, found.outer_px[f, seen], across)]
+            inner, rows, up = self._occluding(view, mesh, found, f)
             if len(inner):
+                occluding = self.lips[rows]
                 parts.append(
                     view.equations(
-                        self.lips.of(mesh, points),
-                        self.lips.of(self.displacements_mm, points),
+                        occluding.of(mesh),
+                        occluding.of(self.displacements_mm),
                         found.inner_px[f, inner],
                         np.broadcast_to(up, (len(inner), 2)),
                     )
@@ -152,7 +138,7 @@ class ContourTracker:
         return weights
 
     def _occluding(self, view: _FrameView, mesh_mm, found: FoundContours, f: int):
-        """(found inner samples, the lips' points that form the contour there, direction up (2,)).
+        """(found inner samples, rows of the lips' points that form the contour there, up (2,)).
 
         In each column of the mouth, the lowest point of the upper lip and the highest of the lower.
         """
@@ -169,7 +155,7 @@ class ContourTracker:
         wanted = np.floor((inner - outer[0]) @ along / column_px).astype(int)
         rows, points = [], []
         for side, samples, sign in ((1, range(1, half), 1.0), (2, range(half + 1, 2 * half), -1.0)):
-            ids = np.flatnonzero(self.lips.side == side)
+            ids = np.flatnonzero(self.sides == side)
             order = ids[np.lexsort((sign * (pixels[ids] @ up), column[ids]))]
             columns, first = np.unique(column[order], return_index=True)
             extreme = dict(zip(columns.tolist(), order[first].tolist(), strict=True))
@@ -206,18 +192,12 @@ class _FrameView:
         return matrix, right
 
 
-def _ring_samples(ring: Ring) -> SurfaceSamples:
-    corners = np.stack([ring.start, ring.end, ring.end], axis=1)
-    weights = np.stack([1 - ring.fraction, ring.fraction, np.zeros(len(ring))], axis=1)
-    return SurfaceSamples(corners, weights, np.zeros(len(ring), dtype=np.int8))
-
-
-def _lip_samples(model: FaceModel) -> SurfaceSamples:
-    """A grid of points on every triangle of the lips and of a little of their inside."""
+def _lip_points(model: FaceModel) -> tuple[MeshPoints, np.ndarray]:
+    """A grid on every triangle of the lips and of a little of their inside, and its sides (N,)."""
     sides = lip_sides(model)[model.triangles]
     whole = (sides == sides[:, :1]).all(axis=1) & (sides[:, 0] > 0)
     steps = np.arange(_SUBDIVISIONS + 1) / _SUBDIVISIONS
     grid = np.array([(a, b, 1 - a - b) for a in steps for b in steps if a + b <= 1 + 1e-9])
     corners = np.repeat(model.triangles[whole], len(grid), axis=0)
     weights = np.tile(grid, (int(whole.sum()), 1))
-    return SurfaceSamples(corners, weights, np.repeat(sides[whole, 0], len(grid)))
+    return MeshPoints(corners, weights), np.repeat(sides[whole, 0], len(grid))
