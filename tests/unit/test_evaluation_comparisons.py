@@ -138,3 +138,12 @@ def test_where_an_advantage_is_missing_the_other_figures_are_told():
     assert "in the layers themselves its error on held-out frames is 0 % less (level)" in why
     assert "a linear map explains nearly all" in why
     assert "the true layers themselves leave 1.00 mm" in why
+
+
+def test_a_baseline_without_cross_validation_is_not_said_to_equal_the_regressor_in_it():
+    take = {"MS": sums(np.full(CLIPS, 2.0)), "contour": sums(np.full(CLIPS, 2.0))}
+    rows = comparisons([(take, 100)], questions_of("kernel"), 200, 0.95, 0)
+    found = estimators(CURVES, TABLE1, "kernel")
+    ((question, sentences),) = statements(rows, found, TABLE1, "kernel")
+    assert question == "The configured regressor against the contour baseline"
+    assert "cross-validation" not in " ".join(sentences)

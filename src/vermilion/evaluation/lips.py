@@ -34,7 +34,7 @@ def columns_of(model: FaceModel) -> np.ndarray:
     sides = lip_sides(model)
     x = model.neutral_mm[:, 0]
     vermilion = lip_labels(model) > 0
-    low, high = np.quantile(x[vermilion], [0.0, 1.0])
+    low, high = x[vermilion].min(), x[vermilion].max()
     start, width = low + 0.25 * (high - low), 0.5 * (high - low) / N_COLUMNS
     column = np.floor((x - start) / width).astype(np.int64)
     return np.where((sides > 0) & (column >= 0) & (column < N_COLUMNS), column, -1)

@@ -23,7 +23,18 @@ _CURVES: dict[str, tuple[tuple[str, ...], str, float]] = {
     "open": (("jawOpen",), "max", 0.25),
     "smile": (("mouthSmile_L", "mouthSmile_R"), "mean", 0.35),
 }
-_OPEN_MM = 7.0
+#: Where no curves are known: what the lips do against their neutral, from which a frame is of a kind.
+#: Like those of the curves they say what the words mean, so they are no options.
+_NARROWER = 0.09  # kiss: loss of width between the corners, of the neutral's width
+_FORWARD_MM = 0.5  # kiss: how far the lips protrude at least
+_THINNER = 0.3  # roll: loss of the red's height, of the neutral's
+_THINNER_SHUT = 0.12  # press: the same, of shut lips ...
+_PRESS_AT_MOST = 1.01  # ... in multiples of it: what thins more is a roll
+_OPEN_MM = 7.0  # open: gap between the lips beyond the neutral's
+_WIDER = 0.1  # smile: gain of width
+#: Lips are shut where their gap is under half of the neutral's, or under this.
+_SHUT_MM = 0.5
+#: Vertices of the neutral this near to a corner landmark make the corner's place.
 _CORNER_MM = 4.0
 
 
@@ -48,7 +59,7 @@ def kinds_of_shapes(
 
     Width between the mouth corners, gap between the lips, height of the red of both lips, how far
     they protrude; each over a threshold. Presses and rolls look alike here where the lips are shut:
-    those that lose over 0.3 of their red are rolls.
+    those that lose more of their red are rolls.
 
     Args:
         points_mm: (F, V, 3) on the model's topology, head frame; neutral_mm: (V, 3) likewise.
@@ -60,14 +71,14 @@ def kinds_of_shapes(
     with np.errstate(divide="ignore", invalid="ignore"):
         wider, thinner = width / width0 - 1.0, 1.0 - red / red0
     forward = protrusion - protrusion0
-    shut = gap < max(0.5 * gap0, 0.5)
+    shut = gap < max(0.5 * gap0, _SHUT_MM)
     scores = np.stack(
         [
-            np.where(forward > 0.5, -wider / 0.09, 0.0),
-            thinner / 0.3,
-            np.where(shut, np.minimum(thinner / 0.12, 1.01), 0.0),
+            np.where(forward > _FORWARD_MM, -wider / _NARROWER, 0.0),
+            thinner / _THINNER,
+            np.where(shut, np.minimum(thinner / _THINNER_SHUT, _PRESS_AT_MOST), 0.0),
             (gap - gap0) / _OPEN_MM,
-            wider / 0.1,
+            wider / _WIDER,
         ],
         axis=1,
     )

@@ -85,8 +85,10 @@ def why(
             f"{'less' if change >= 0 else 'more'} ({word[layers['answer'].iloc[0]]})"
         )
     pair = estimators[estimators["regressor"] == kind].set_index("estimator")["feature_error"]
-    names = [row[side].partition("/")[2] or configured for side in ("first", "second")]
-    if all(name in pair.index for name in names):
+    of_kind = [row[side].partition("/") for side in ("first", "second")]
+    names = [variant or configured for _, _, variant in of_kind]
+    # The base track and the contour baseline are no estimators: they have no cross-validation.
+    if {name for name, _, _ in of_kind} == {kind} and all(name in pair.index for name in names):
         change = 100 * (1 - pair[names[0]] / pair[names[1]])
         parts.append(
             f"in cross-validation {abs(change):.0f} % {'less' if change >= 0 else 'more'}"

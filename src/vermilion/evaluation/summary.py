@@ -16,8 +16,8 @@ from vermilion.evaluation.table1 import in_order, place_of
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
 REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
 _STAGES = (
-    "capture", "multiview", "inpaint", "landmarks", "tracking", "refinement", "contours", "features",
-    "correspondence", "correction", "evaluation", "apply",
+    "capture", "multiview", "inpaint", "landmarks", "scan", "tracking", "refinement", "detail",
+    "contours", "features", "correspondence", "correction",
 )  # fmt: skip
 
 
