@@ -1,89 +1,34 @@
-"""Facts about the generated head: a closed skin, a plausible mouth, expressions that behave."""
+"""Facts about the generated head: a closed skin, an adult's proportions, regions and contours."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tests.heads import small_tracker
+from tests import heads
 from vermilion.faces.model import REGIONS, FaceModel
-from vermilion.faces.procedural import studio_model, template_model, tracker_model
+from vermilion.faces.procedural import tracker_model
 from vermilion.mesh import boundary_edges, triangle_areas, unique_edges, vertex_normals
-from vermilion.raycast import RayCaster
-
-SLIGHTLY_OPEN = 0.09
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def studio() -> FaceModel:
-    return studio_model(seed=None)
+    return heads.studio()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def template() -> FaceModel:
-    return template_model(SLIGHTLY_OPEN)
+    return heads.template()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def tracker() -> FaceModel:
-    return tracker_model(6000)
+    return heads.tracker()
 
 
-@pytest.fixture(scope="module", params=["studio", "template", "tracker"])
+@pytest.fixture(params=["studio", "template", "tracker"])
 def part(request) -> FaceModel:
-    return request.getfixturevalue(request.param)
-
-
-def weights_of(model: FaceModel, **weights: float) -> np.ndarray:
-    result = np.zeros(model.n_expressions)
-    for name, value in weights.items():
-        result[model.expression_names.index(name)] = value
-    return result
-
-
-def mouth(model: FaceModel, jaw: float = SLIGHTLY_OPEN, identity=None, **weights) -> np.ndarray:
-    return model.vertices(identity, weights_of(model, **({"jawOpen": jaw} | weights)))
-
-
-def lip_triangles(model: FaceModel, which: str) -> np.ndarray:
-    """Triangles of one lip with its inner fold, told apart by where the neutral's lips meet."""
-    other = "vermilion_lower" if which == "vermilion_upper" else "vermilion_upper"
-    loop = model.neutral_mm[model.inner_contour]
-    line_y = np.interp(model.neutral_mm[:, 0], np.sort(loop[:, 0]), loop[np.argsort(loop[:, 0]), 1])
-    above = model.neutral_mm[:, 1] > line_y
-    inner = model.regions["mouth_inner"] & (above if which == "vermilion_upper" else ~above)
-    inner &= model.neutral_mm[:, 2] > model.neutral_mm[model.inner_contour, 2].max() - 7.0
-    keep = (model.regions[which] & ~model.regions[other]) | inner
-    return model.triangles[keep[model.triangles].all(axis=1)]
-
-
-def lip_gap_mm(model: FaceModel, vertices: np.ndarray) -> float:
-    """Least vertical distance from the lower lip's top to the upper lip's underside."""
-    x, z = np.meshgrid(np.arange(-30, 30, 0.5), np.arange(60, 115, 0.5))
-    below, above = np.stack([x, 0 * x - 200, z], -1), np.stack([x, 0 * x + 200, z], -1)
-    up = np.broadcast_to([0.0, 1.0, 0.0], below.shape)
-    upper = RayCaster(vertices, lip_triangles(model, "vermilion_upper")).cast(below, up)
-    lower = RayCaster(vertices, lip_triangles(model, "vermilion_lower")).cast(above, -up)
-    gap = (upper.distance_mm - 200.0) - (200.0 - lower.distance_mm)
-    return float(gap[upper.hit & lower.hit].min(initial=np.inf))
-
-
-def aperture_mm(model: FaceModel, vertices: np.ndarray) -> float:
-    """Distance between the middles of the inner contours."""
-    ids = model.landmarks
-    return float(np.linalg.norm(vertices[ids[60]] - vertices[ids[64]]))
-
-
-def visible_red_mm2(model: FaceModel, vertices: np.ndarray, region: str) -> float:
-    """Area of a lip's red in an orthographic frontal view."""
-    step = 0.4
-    x, y = np.meshgrid(np.arange(-35, 35, step), np.arange(-75, -15, step))
-    origins = np.stack([x, y, 0 * x + 300], -1)
-    hits = RayCaster(vertices, model.triangles).cast(
-        origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape)
-    )
-    red = model.regions[region][model.triangles[np.maximum(hits.triangle, 0)]].all(axis=-1)
-    return float((red & hits.hit).sum() * step**2)
+    return getattr(heads, request.param)()
 
 
 # -- topology ------------------------------------------------------------------------------------
@@ -136,7 +81,7 @@ def test_parts_have_their_own_topologies(studio, template, tracker):
 
 
 def test_building_twice_gives_the_same_model():
-    a, b = small_tracker(), tracker_model(2500, n_identities=4)
+    a, b = heads.small_tracker(), tracker_model(2500, n_identities=4)
     np.testing.assert_array_equal(a.neutral_mm, b.neutral_mm)
     np.testing.assert_array_equal(a.triangles, b.triangles)
     np.testing.assert_array_equal(a.expressions_mm, b.expressions_mm)
@@ -196,121 +141,6 @@ def test_uv_lie_in_the_unit_square_and_do_not_fold_on_face_and_lips(part):
     a, b, c = (part.uv[part.triangles[skin[part.triangles].all(axis=1)][:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     assert (signed > 0).mean() > 0.995
-
-
-# -- expressions ---------------------------------------------------------------------------------
-
-
-def test_lips_are_parted_when_slightly_open(studio, template):
-    assert 2.0 < aperture_mm(studio, mouth(studio)) < 3.5
-    assert 2.0 < aperture_mm(template, template.neutral_mm) < 3.5
-    assert aperture_mm(studio, studio.neutral_mm) < 0.5
-
-
-def test_jaw_opens_the_mouth_by_an_adults_aperture(studio):
-    apertures = [aperture_mm(studio, mouth(studio, jaw)) for jaw in (0.0, 0.5, 1.0)]
-    assert apertures[0] < apertures[1] < apertures[2]
-    assert 24 < apertures[2] < 32
-
-
-def test_lips_do_not_pass_through_each_other(studio):
-    quiet = ("brow", "eye", "jawOpen", "mouthClose")
-    for name in studio.expression_names:
-        if not name.startswith(quiet):
-            assert lip_gap_mm(studio, mouth(studio, **{name: 1.0})) >= -0.3, name
-    assert lip_gap_mm(studio, mouth(studio, jaw=1.0, mouthClose=1.0)) >= -0.3
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("mouthSmile_L", "mouthSmile_R"),
-        ("mouthFrown_L", "mouthFrown_R"),
-        ("mouthPress_L", "mouthPress_R"),
-        ("mouthRollUpper", "mouthRollLower"),
-        ("mouthRollOutUpper", "mouthRollOutLower"),
-        ("mouthPucker", "mouthFunnel"),
-        ("mouthPucker", "mouthRollLower"),
-    ],
-)
-def test_common_combinations_keep_the_lips_apart(studio, names):
-    assert lip_gap_mm(studio, mouth(studio, **dict.fromkeys(names, 1.0))) >= -0.3
-
-
-def test_rolls_hide_the_red_of_their_lip_alone(studio):
-    rest = {n: visible_red_mm2(studio, mouth(studio), f"vermilion_{n}") for n in ("upper", "lower")}
-    for name, lip, other in (
-        ("mouthRollUpper", "upper", "lower"),
-        ("mouthRollLower", "lower", "upper"),
-    ):
-        rolled = mouth(studio, **{name: 1.0})
-        assert visible_red_mm2(studio, rolled, f"vermilion_{lip}") < 0.7 * rest[lip]
-        assert visible_red_mm2(studio, rolled, f"vermilion_{other}") > 0.9 * rest[other]
-
-
-def test_mouth_close_undoes_the_jaws_parting(studio):
-    closed = mouth(studio, jaw=1.0, mouthClose=1.0)
-    assert aperture_mm(studio, closed) < 1.5
-    teeth = studio.regions["teeth"]
-    moved = np.linalg.norm(closed[teeth] - studio.neutral_mm[teeth], axis=1)
-    assert moved.max() > 15  # the jaw stays open
-
-
-def test_left_and_right_shapes_mirror_each_other(studio):
-    left = studio.expressions_mm[studio.expression_names.index("mouthSmile_L")]
-    right = studio.expressions_mm[studio.expression_names.index("mouthSmile_R")]
-    ring = studio.outer_contour
-    n = len(ring)
-    mirrored = ring[(n // 2 - np.arange(n)) % n]
-    np.testing.assert_allclose(left[ring] * [-1, 1, 1], right[mirrored], atol=0.05)
-
-
-def test_displacements_are_bounded_and_leave_the_rigid_region(studio, tracker):
-    for model in (studio, tracker):
-        size = np.linalg.norm(model.expressions_mm, axis=-1)
-        assert size.max() < 45
-        assert size[:, model.regions["rigid"]].max() < 0.5
-        back = model.neutral_mm[:, 2] < -35
-        assert size[:, back].max() < 1e-3
-
-
-def test_eyelids_close_without_the_eyeball_showing(studio):
-    for weight in (0.5, 1.0):
-        v = mouth(studio, eyeBlink_L=weight)
-        eye = studio.regions["eyes"] & (studio.neutral_mm[:, 0] > 0)
-        x, y = np.meshgrid(np.arange(20, 44, 0.5), np.arange(20, 36, 0.5))
-        origins = np.stack([x, y, 0 * x + 300], -1)
-        hits = RayCaster(v, studio.triangles).cast(
-            origins, np.broadcast_to([0.0, 0.0, -1.0], origins.shape)
-        )
-        seen = eye[studio.triangles[np.maximum(hits.triangle, 0)]].all(axis=-1) & hits.hit
-        assert (seen.sum() * 0.25 < 6.0) if weight == 1.0 else (40 < seen.sum() * 0.25 < 160)  # mm2
-
-
-# -- people --------------------------------------------------------------------------------------
-
-
-def test_people_differ_and_keep_their_lips_apart(studio):
-    rng = np.random.default_rng(3)
-    people = rng.normal(size=(3, studio.n_identities)).clip(-2, 2)
-    neutrals = [studio.neutral_of(p) for p in people]
-    face = studio.regions["face"]
-    for k, p in enumerate(people):
-        assert lip_gap_mm(studio, mouth(studio, identity=p)) >= -0.3
-        difference = np.linalg.norm(neutrals[k] - neutrals[k - 1], axis=1)[face]
-        assert 0.5 < difference.mean() < 8
-
-
-def test_lip_modes_change_the_height_of_the_red(studio):
-    rest = visible_red_mm2(studio, studio.neutral_mm, "vermilion_lower")
-    fuller = studio.neutral_of(np.eye(studio.n_identities)[3] * 2)
-    assert visible_red_mm2(studio, fuller, "vermilion_lower") > 1.1 * rest
-
-
-def test_seeds_make_small_asymmetries():
-    odd = studio_model(spacing_mm=2.5, seed=5)
-    p = odd.neutral_mm[odd.landmarks]
-    assert 0.02 < abs(p[58, 0] + p[62, 0]) + abs(p[58, 1] - p[62, 1]) < 4.0
 
 
 def test_the_same_face_at_three_resolutions(studio, template, tracker):

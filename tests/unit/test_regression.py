@@ -5,33 +5,25 @@ import pytest
 from sklearn.base import clone
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
-from sklearn.model_selection import GroupKFold
 
+from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import (
     clips_of,
-    cross_validate,
     held_out_novelty,
-    target_gram,
 )
 from vermilion.regression.estimators import (
     AffineRegressor,
     RBFNetwork,
     gaussian_activations,
-    temporal_prototypes,
 )
 from vermilion.regression.kernel import KernelRegressor
-from vermilion.regression.linear import bias_of_a_stranger
 from vermilion.regression.ridge import ridge_weights
 from vermilion.regression.scaling import feature_scale
 
 
 @pytest.fixture
 def data():
-    """Smooth features (120, 7) and outputs (120, 30) that depend on them without being linear."""
-    rng = np.random.default_rng(0)
-    features = rng.normal(size=(120, 7)).cumsum(axis=0)
-    targets = np.sin(0.3 * features @ rng.normal(size=(7, 30)))
-    return features, targets + 0.05 * rng.normal(size=targets.shape)
+    return smooth_data()
 
 
 def test_primal_equals_dual(data):
@@ -223,117 +215,6 @@ def test_a_constant_feature_says_nothing(data):
         for kind in (RBFNetwork, KernelRegressor):
             fitted = kind(feature_groups=groups).fit(features, targets)
             np.testing.assert_array_equal(fitted.predict(changed), fitted.predict(features))
-
-
-def test_prototypes_are_every_tenth_frame_of_each_sequence():
-    sequences = np.repeat([4, 9], [50, 30])
-    np.testing.assert_array_equal(
-        temporal_prototypes(sequences, 10), [5, 15, 25, 35, 45, 55, 65, 75]
-    )
-
-
-def test_short_takes_get_more_prototypes():
-    assert len(temporal_prototypes(np.zeros(34), 10, minimum=20)) == 34
-    assert len(temporal_prototypes(np.zeros(45), 10, minimum=20)) == 22
-    assert len(temporal_prototypes(np.repeat([0, 1], [30, 2]), 10)) == 4  # 3 and the middle of 2
-
-
-def test_clips_are_contiguous_and_never_cross_sequences():
-    sequences = np.repeat([0, 1], [70, 31])
-    clips = clips_of(sequences, 30, 3)
-    assert np.all(np.diff(clips) >= 0)
-    assert not set(clips[:70]) & set(clips[70:])
-    assert len(np.unique(clips_of(np.zeros(9), 30, 5))) >= 5
-
-
-def test_cross_validation_equals_fitting_and_predicting(data):
-    features, targets = data
-    sequences, weights = np.repeat([0, 1], 60), np.linspace(0.5, 2.0, 30)
-    clips = clips_of(sequences, 15, 5)
-    alphas, betas = [1e-4, 1e-2, 10.0], [0.1, 3.0]
-    groups = ["a"] * 3 + ["b"] * 4
-    given = (features, target_gram(targets, weights), weights.sum(), sequences, clips)
-    network = RBFNetwork(feature_groups=groups, reach=0.1)
-    curve = cross_validate(network, *given, alphas=alphas, betas=betas)
-    affine = cross_validate(AffineRegressor(), *given, alphas=alphas)
-    kernel = cross_validate(KernelRegressor(), *given, alphas=alphas, betas=betas)
-    for k, (train, held) in enumerate(GroupKFold(5).split(clips, groups=clips)):
-
-        def error(regressor, train=train, held=held):
-            fitted = regressor.fit(features[train], targets[train], sequences[train])
-            squares = (fitted.predict(features[held]) - targets[held]) ** 2
-            return np.sqrt((squares @ weights).sum() / (len(held) * weights.sum()))
-
-        for j, alpha in enumerate(alphas):
-            for i, beta in enumerate(betas):
-                network = RBFNetwork(alpha, beta, feature_groups=groups, reach=0.1)
-                plain = error(network)
-                assert curve.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
-                plain = error(KernelRegressor(alpha, beta))
-                assert kernel.errors[i, j, k] == pytest.approx(plain, rel=1e-5)
-            assert affine.errors[0, j, k] == pytest.approx(error(AffineRegressor(alpha)), rel=1e-5)
-
-
-def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(data):
-    features, targets = data
-    persons = np.repeat([0, 1, 2], [50, 60, 10])
-    targets = targets + 5.0 * persons[:, None]
-    clips = clips_of(persons, 10, 4)
-    curve = cross_validate(
-        AffineRegressor(), features, target_gram(targets), 30, persons, clips,
-        alphas=[0.1], n_folds=4, persons=persons,
-    )  # fmt: skip
-    for k, (train, held) in enumerate(GroupKFold(4).split(clips, groups=clips)):
-        people, label = np.unique(persons[train], return_inverse=True)
-        regressor = AffineRegressor(0.1).fit(features[train], targets[train], persons=label)
-        squares = []
-        for person in np.unique(persons[held]):
-            rows = held[persons[held] == person]
-            if person in people:
-                predicted = regressor.predict(features[rows], int(np.searchsorted(people, person)))
-                squares.append((predicted - targets[rows]) ** 2)
-        if set(persons[held]) <= set(people):
-            plain = np.sqrt(np.concatenate(squares).mean())
-            assert curve.errors[0, 0, k] == pytest.approx(plain, rel=1e-5)
-
-
-def test_a_bias_a_person_takes_what_no_feature_tells(data):
-    features, targets = data
-    persons = np.repeat([0, 1], 60)
-    shifted = targets + np.where(persons == 0, -2.0, 3.0)[:, None]
-    plain = AffineRegressor(1.0).fit(features, targets, persons=persons)
-    own = AffineRegressor(1.0).fit(features, shifted, persons=persons)
-    np.testing.assert_allclose(own.weights_, plain.weights_, atol=1e-9)
-    for person, shift in ((0, -2.0), (1, 3.0)):
-        np.testing.assert_allclose(
-            own.predict(features, person), plain.predict(features, person) + shift, atol=1e-9
-        )
-
-
-def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
-    neutral = np.zeros(400)
-    rng = np.random.default_rng(0)
-    alike = 1.0 + 0.01 * rng.normal(size=(4, 400))
-    np.testing.assert_allclose(bias_of_a_stranger(alike, neutral), 1.0, atol=0.03)
-    unlike = rng.normal(size=(4, 400))
-    assert np.abs(bias_of_a_stranger(unlike, neutral)).mean() < 0.1
-    np.testing.assert_allclose(bias_of_a_stranger(alike[:1], neutral), alike[0] / 2)
-
-
-def test_choice_takes_the_smoothest_within_one_standard_error(data):
-    features, targets = data
-    clips = clips_of(np.zeros(120), 15, 5)
-    curve = cross_validate(
-        AffineRegressor(), features, target_gram(targets), 30, np.zeros(120), clips,
-        alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3],
-    )  # fmt: skip
-    least, simplest = curve.choose("least"), curve.choose("simplest")
-    assert curve.mean[least] == curve.mean.min()
-    assert curve.freedom[simplest] <= curve.freedom[least]
-    assert curve.mean[simplest] <= curve.mean[least] + curve.standard_error[least]
-    # Freedom falls as alpha grows, from the number of features to none.
-    assert np.all(np.diff(curve.freedom[0]) < 0)
-    assert curve.freedom[0, 0] < 7
 
 
 def test_ridge_needs_a_positive_parameter(data):
