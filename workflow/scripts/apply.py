@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.apply import correct_sequence
@@ -12,7 +13,6 @@ from vermilion.correction.picture import (
     frames_around,
 )
 from vermilion.draw import to_display
-from vermilion.evaluation.files import read_chunks, read_frames
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
 from vermilion.frames import open_frames

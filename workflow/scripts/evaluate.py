@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
 from vermilion.correction.picture import (
@@ -18,7 +19,7 @@ from vermilion.errors import InputError
 from vermilion.evaluation import held_out
 from vermilion.evaluation.contour_tracker import ContourTracker, FoundContours
 from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
-from vermilion.evaluation.files import read_chunks, read_frames, save_arrays, save_sums
+from vermilion.evaluation.files import save_arrays, save_sums
 from vermilion.evaluation.lip_shapes import LipShapes
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows

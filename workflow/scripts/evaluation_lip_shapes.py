@@ -4,8 +4,8 @@ from functools import reduce
 
 import numpy as np
 
+from vermilion.chunks import read_frames
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.evaluation.files import read_frames
 from vermilion.evaluation.lip_shapes import PosedTake, choose_lip_shapes
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to

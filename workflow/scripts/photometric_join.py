@@ -1,6 +1,6 @@
 """The refined frames of a take, smooth over time, as the track that all later stages use."""
 
-from vermilion.evaluation.files import read_chunks
+from vermilion.chunks import read_chunks
 from vermilion.logfile import log_to
 from vermilion.photometric.join import join_frames
 from vermilion.photometric.take import TakeStart
@@ -10,7 +10,7 @@ def main(snakemake):
     inputs, cfg = snakemake.input, snakemake.params.cfg
     fit, _, start = TakeStart.load(inputs, cfg)
     names = ["x", "matrix", "right", "refined"]
-    found = read_chunks(list(inputs.chunks), [int(frame) for frame in fit.frames], names)
+    found = read_chunks(inputs.chunks, fit.frames, names)
     x = join_frames(
         found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps,
         start.settings,

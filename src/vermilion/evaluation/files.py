@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from vermilion.arrays import read_arrays, write_arrays
 from vermilion.evaluation.errors import ClipSums
-from vermilion.sequences import frames_of, read_sequence
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
@@ -41,17 +39,3 @@ def load_sums(path: str | Path) -> tuple[dict[str, ClipSums], int]:
         regressor, name = key.split(":", 1)
         sums.setdefault(regressor, {})[name] = values
     return {regressor: ClipSums(values) for regressor, values in sums.items()}, n_frames
-
-
-def read_frames(paths: Sequence[str | Path], frames: np.ndarray) -> np.ndarray:
-    """Meshes (F, V, 3) of chunk files `<first>-<last>.npy` at frame numbers (F,)."""
-    row_of = {int(frame): row for row, frame in enumerate(frames_of(paths))}
-    return read_sequence(paths)[[row_of[int(frame)] for frame in frames]]
-
-
-def read_chunks(paths: Sequence[str | Path], frames: np.ndarray, names: Sequence[str]) -> dict:
-    """Named arrays of chunk files `<first>-<last>.npz`, first axis frames, at `frames` (F,)."""
-    parts = [load_arrays(path) for path in paths]
-    row_of = {int(frame): row for row, frame in enumerate(frames_of(paths))}
-    rows = [row_of[int(frame)] for frame in frames]
-    return {name: np.concatenate([part[name] for part in parts])[rows] for name in names}
