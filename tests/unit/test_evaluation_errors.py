@@ -9,7 +9,7 @@ from tests import lip_patch
 from tests.unit.evaluation_face import mouth_triangles, sheet_face
 from vermilion.camera import look_at, pinhole
 from vermilion.evaluation.errors import ClipSums, second_differences
-from vermilion.evaluation.lips import lip_depths
+from vermilion.evaluation.lips import LipTolerances, lip_depths
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import Reference
@@ -46,7 +46,7 @@ def turned(sequence: np.ndarray, degrees: float, shift) -> np.ndarray:
 
 def evaluate(model, regions, sequences, truth):
     reference = Reference("truth", truth, truth, model.triangles)
-    result = evaluate_take(sequences, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
+    result = evaluate_take(sequences, FRAMES, model, regions, reference, 2, 1, LipTolerances())
     rows = measure_rows(result.sums, "s", "t", len(FRAMES), 200, 0.95, 0)
     return result, rows.set_index(["measure", "region", "regressor"])["value"]
 
@@ -123,7 +123,7 @@ def test_vertices_without_a_counterpart_do_not_count(face):
     known = truth.copy()
     known[:, regions.lips == 1] = np.nan
     reference = Reference("truth", known, truth, model.triangles)
-    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, LipTolerances())
     rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
     value = rows.set_index(["measure", "region"])["value"]
     assert value["vertex_error_mean_mm", "vermilion"] < 1e-9
@@ -141,7 +141,7 @@ def test_mean_is_weighted_by_area_on_a_graded_mesh():
     inside = regions.weights["mouth"] > 0
     base[:, right & inside, 2] += 1.0
     reference = Reference("truth", truth, truth, model.triangles)
-    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, 0.3, 1.0)
+    result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, LipTolerances())
     rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)
     value = rows.set_index(["measure", "region"])["value"]["vertex_error_mean_mm", "mouth"]
     area = vertex_areas(crowded, model.triangles[mouth_triangles(model)])

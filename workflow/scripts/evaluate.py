@@ -21,6 +21,7 @@ from vermilion.evaluation.contour_tracker import ContourTracker, FoundContours
 from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
 from vermilion.evaluation.files import save_arrays, save_sums
 from vermilion.evaluation.lip_shapes import LipShapes
+from vermilion.evaluation.lips import LipTolerances
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import reference_of
@@ -152,7 +153,8 @@ def main(snakemake):
     against = reference(snakemake, tracker, correspondence, frames)
     result = evaluate_take(
         sequences, frames, tracker, regions, against,
-        options.clip_frames, options.min_clips, options.touch_mm, options.gape_mm,
+        options.clip_frames, options.min_clips,
+        LipTolerances(options.touch_mm, options.gape_mm, options.through_mm),
         true_curves(snakemake, frames),
     )  # fmt: skip
 

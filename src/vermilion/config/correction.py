@@ -92,6 +92,19 @@ class PictureConfig(StageConfig):
         description="Weight of a millimetre of lip contour, as a constraint that it projects on the one "
         "found in the picture, beside the stiffness of the mesh. 0: none.",
     )
+    contour_robust_mm: float = Field(
+        2.5,
+        gt=0.0,
+        le=100.0,
+        description="A contour point this far beside the mesh's contour counts half, farther ones less (mm).",
+    )
+    closed: float = Field(
+        0.012,
+        ge=0.0,
+        le=0.2,
+        description="The lips touch where the inner contour in the picture is lower than this, per "
+        "distance between the outer corners of the eyes (about 1 mm).",
+    )
     contact: bool = Field(
         True,
         description="Lips that touch in the picture meet in the mesh (by `contour_weight`), and never pass "

@@ -62,6 +62,12 @@ class MeasuresConfig(StageConfig):
         description="A result is falsely open where the lips touch in truth and its gap is over "
         "this (mm).",
     )
+    through_mm: float = Field(
+        0.05,
+        ge=0.0,
+        le=10.0,
+        description="Lips pass through each other where one lies deeper than this in the other (mm).",
+    )
     seed: int = Field(0, ge=0, description="Seed of the bootstrap.")
 
 

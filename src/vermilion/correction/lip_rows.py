@@ -12,10 +12,6 @@ from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.features.rings import Ring
 from vermilion.mesh_points import MeshPoints
 
-#: A contour point this far off counts half (mm).
-_ROBUST_MM = 2.5
-#: The inner contour is closed where it is lower than this, per inter-ocular distance.
-CLOSED = 0.012
 #: How far in one lip another lip may lie (mm), and how far apart they are set then.
 SLACK_MM, _APART_MM = 0.01, 0.005
 
@@ -55,6 +51,7 @@ def contour_rows(
     camera: Camera,
     lines: tuple[np.ndarray, np.ndarray, np.ndarray],
     weight: float,
+    robust_mm: float,
 ) -> Rows:
     """Each sample projects on its line (point to line, depth free), linearised at the mesh.
 
@@ -62,13 +59,14 @@ def contour_rows(
         vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
         lines: (m, 2) points, (m, 2) normals, (m,) known, of `Picture.lines`.
         weight: of a millimetre of contour.
+        robust_mm: a point this far off counts half.
     """
     points_px, normals, known = lines
     world = samples.points.of(vertices_mm) @ rotation.T + translation_mm
     across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
-    counts = weight * samples.length_mm / (1.0 + (off_mm / _ROBUST_MM) ** 2)
+    counts = weight * samples.length_mm / (1.0 + (off_mm / robust_mm) ** 2)
     rows = Rows(
         samples.points.vertices, samples.points.weights, across / px_per_mm[:, None], off_mm,
         1.0 / counts, np.zeros(len(off_mm), dtype=bool),
@@ -84,6 +82,7 @@ def touch_rows(
     unit_px: float,
     view: np.ndarray,
     weight: float,
+    closed: float,
 ) -> Rows:
     """Where the inner contour is closed in the picture, its upper and lower samples meet.
 
@@ -94,14 +93,15 @@ def touch_rows(
         view: (3,) unit direction of the view in the head frame: it and the vertical are held, along
             the mouth the lips slide.
         weight: of a millimetre of contour.
+        closed: height of the inner contour per inter-ocular distance, under which it is closed.
     """
     n = len(inner_px)
     upper = np.arange(1, n // 2)
     lower = n - upper
     apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
-    closed = (apart < CLOSED) & known[upper] & known[lower]
+    touching = (apart < closed) & known[upper] & known[lower]
     inner = len(samples.points) - n  # where the inner ring begins
-    upper, lower = inner + upper[closed], inner + lower[closed]
+    upper, lower = inner + upper[touching], inner + lower[touching]
     above, below = samples.points[upper], samples.points[lower]
     vertices = np.concatenate([above.vertices, below.vertices], axis=1)
     coefficients = np.concatenate([above.weights, -below.weights], axis=1)

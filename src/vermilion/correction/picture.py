@@ -26,12 +26,16 @@ class PictureSettings:
         repose: whether the corrected head is laid on the picture again.
         repose_frames: deviation of the symmetric filter over time of that motion, frames.
         contour_weight: of a millimetre of contour beside the mesh's stiffness.
+        contour_robust_mm: a contour point this far off counts half.
+        closed: lips touch where the inner contour is lower than this, per inter-ocular distance.
         contact: whether lips that touch in the picture meet, and never pass through each other.
     """
 
     repose: bool = True
     repose_frames: float = 3.0
     contour_weight: float = 1.0
+    contour_robust_mm: float = 2.5
+    closed: float = 0.012
     contact: bool = True
 
     @property

@@ -113,8 +113,9 @@ class PictureFit:
         """Rows of a frame and the forces along them."""
         weight, n = self.settings.contour_weight, picture.inner_px.shape[1]
         rows = contour_rows(
-            self._samples, vertices, rotation, translation_mm, picture.camera, lines, weight or 1.0
-        )
+            self._samples, vertices, rotation, translation_mm, picture.camera, lines,
+            weight or 1.0, self.settings.contour_robust_mm,
+        )  # fmt: skip
         if weight == 0:
             rows = rows[:0]
         if not self.settings.contact:
@@ -124,7 +125,7 @@ class PictureFit:
             view = (view - picture.camera.centre_mm) @ rotation
             rows += touch_rows(
                 self._samples, vertices, picture.inner_px[f], lines[2][n:], unit_px,
-                view / np.linalg.norm(view), weight,
+                view / np.linalg.norm(view), weight, self.settings.closed,
             )  # fmt: skip
         return self._parted(vertices, rows)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vermilion.evaluation.closest import Surface
-from vermilion.evaluation.lips import aperture_mm, lip_gaps
+from vermilion.evaluation.lips import LipTolerances, aperture_mm, lip_gaps
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import histograms
@@ -133,18 +133,13 @@ def sums_of_aperture(
     result_gaps: np.ndarray,
     reference_gaps: np.ndarray,
     clips: np.ndarray,
-    touch_mm: float,
-    gape_mm: float,
+    tolerances: LipTolerances,
 ) -> ClipSums:
-    """Sums behind `aperture_error_mm` and `false_open_rate`, of gaps (F, columns) mm.
-
-    Lips touch where no column of the reference is open by more than `touch_mm`; they gape where a
-    column of the result is open by more than `gape_mm`.
-    """
+    """Sums behind `aperture_error_mm` and `false_open_rate`, of gaps (F, columns) mm."""
     difference = np.abs(aperture_mm(result_gaps) - aperture_mm(reference_gaps))
     known = np.isfinite(difference)
-    touch = known & (_widest(reference_gaps) <= touch_mm)
-    gape = touch & (_widest(result_gaps) > gape_mm)
+    touch = known & (_widest(reference_gaps) <= tolerances.touch_mm)
+    gape = touch & (_widest(result_gaps) > tolerances.gape_mm)
     return ClipSums(
         {
             "mouth.aperture_frames": by_clip(known.astype(float), clips),

@@ -57,9 +57,9 @@ percentile is weighted by the area of the neutral.</p>
 nearest point of the true surface. Gap: lowest point of the upper lip less highest point of the lower, in
 seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
 time, less that of the truth. Contour error: distance of contour points found in the picture to the
-projected contours of the mesh, per inter-ocular distance. Lip penetration: frames in which an edge of one lip enters
-the other. Feature error: RMS of regressed against true
-layer entries.</p>
+projected contours of the mesh, per inter-ocular distance. Lip penetration: share of frames in which one
+lip lies deeper in the other than <code>evaluation.measures.through_mm</code>. Feature error: RMS of
+regressed against true layer entries.</p>
 <p><b>Kinds of mouth shapes.</b> By the true expression weights where they are known, each over a threshold
 (pucker or funnel, rolls, presses, jaw, smiles), else by width, gap, height of the red and protrusion of the
 reference's lips against its neutral; speech is what lies between.</p>

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
@@ -11,8 +13,21 @@ from vermilion.mesh import adjacency
 
 N_COLUMNS = 7
 _GROW_RINGS = 2
-#: Lips pass through each other where one lies deeper in the other (mm).
-THROUGH_MM = 0.05
+
+
+@dataclass(frozen=True)
+class LipTolerances:
+    """When lips count as touching, open, or one in the other; mm.
+
+    Attributes:
+        touch_mm: lips touch in truth where no column is open by more.
+        gape_mm: a result is open where a column is open by more.
+        through_mm: lips pass through each other where one lies deeper in the other.
+    """
+
+    touch_mm: float = 0.3
+    gape_mm: float = 1.0
+    through_mm: float = 0.05
 
 
 def lip_sides(model: FaceModel) -> np.ndarray:

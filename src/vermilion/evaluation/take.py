@@ -22,7 +22,13 @@ from vermilion.evaluation.errors import (
     vertex_errors,
 )
 from vermilion.evaluation.kind_errors import sums_of_kinds
-from vermilion.evaluation.lips import THROUGH_MM, aperture_mm, columns_of, lip_depths, lip_sides
+from vermilion.evaluation.lips import (
+    LipTolerances,
+    aperture_mm,
+    columns_of,
+    lip_depths,
+    lip_sides,
+)
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
@@ -63,8 +69,7 @@ def evaluate_take(
     reference: Reference,
     clip_frames: int,
     min_clips: int,
-    touch_mm: float,
-    gape_mm: float,
+    tolerances: LipTolerances,
     curves: Sequence[Mapping[str, float]] | None = None,
 ) -> TakeResult:
     """Measure `base` and its corrections after one rigid alignment a frame.
@@ -110,9 +115,11 @@ def evaluate_take(
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
-            + sums_of_aperture(gaps, true_gaps, clips, touch_mm, gape_mm)
+            + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)
-            + sums_of_frames("mouth.through", lip_depths(sequence, model) > THROUGH_MM, clips)
+            + sums_of_frames(
+                "mouth.through", lip_depths(sequence, model) > tolerances.through_mm, clips
+            )
         )
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
