@@ -109,7 +109,7 @@ rule evaluate_reconstruction:
 rule evaluation_figures:
     """Renders, surface stretch and errors from front and side, curves over time (fig. 9 to 16)."""
     input:
-        pictures=picture_files,
+        pictures=mono_pictures,
         maps=EVALUATED + "/maps.npz",
         frames=EVALUATED + "/frames.tsv",
     output:
@@ -151,7 +151,7 @@ rule evaluation_figures:
     params:
         cfg=cfg_of("evaluation.figures"),
         code=code_of("evaluation_figures"),
-        source=pictures_of,
+        source=mono_sources,
         camera=mono_camera,
     script:
         "../scripts/evaluation_figures.py"

@@ -1,6 +1,6 @@
-"""What the evaluation reads: takes that are measured, their truth, models, pictures.
+"""What the evaluation reads: takes that are measured, their truth, models.
 
-The only files that name truth are this one and evaluation.smk.
+The studio alone writes truth; besides it, only this file and evaluation.smk name it.
 """
 
 
@@ -113,17 +113,3 @@ def of_training_chunks(pattern):
         for take in takes_that_train()
         for path in expand_chunks(R + "/takes/{subject}/{take}/" + pattern, take.subject, take.take)
     ]
-
-
-def pictures_of(wildcards):
-    """What `open_frames` opens for all monocular pictures of a take."""
-    if take_of(wildcards).role == "tattoo":
-        return per_chunk(R + "/takes/{subject}/{take}/inpaint/{chunk}")(wildcards)
-    return source_of(wildcards)
-
-
-def picture_files(wildcards):
-    """Jobs' outputs behind `pictures_of`."""
-    if take_of(wildcards).role == "tattoo":
-        return pictures_of(wildcards)
-    return per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json")(wildcards)

@@ -1,6 +1,5 @@
 """Every regressor on the held-out frames of a take, against truth or against held-out H."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +25,7 @@ from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import reference_of
 from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_errors
+from vermilion.evaluation.truth import read_curves, read_truth
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
 from vermilion.quality import QualityRow, write_quality
@@ -50,7 +50,7 @@ def tracked_frames(fit, asked, place):
     return tracked
 
 
-def reference(snakemake, tracker, correspondence, frames):
+def reference(snakemake, tracker, correspondence, frames, place):
     """Truth where it is given, else H, at the frames."""
     inputs = snakemake.input
     if not inputs.get("truth"):
@@ -58,8 +58,7 @@ def reference(snakemake, tracker, correspondence, frames):
         neutral = read_frames(inputs.accurate, [snakemake.params.first])[0]
         where = held_out.points_on_h(correspondence)
         return reference_of("H", where, vertices, correspondence.accurate_triangles, neutral)
-    triangles = np.load(inputs.neutral_truth[1])
-    neutral = np.load(inputs.neutral_truth[0], mmap_mode="r")[0]
+    (neutral,), triangles = read_truth(*inputs.neutral_truth, rows=np.array([0]), **place)
     where = held_out.points_on_truth(
         correspondence,
         tracker,
@@ -69,17 +68,14 @@ def reference(snakemake, tracker, correspondence, frames):
         triangles,
         **ReferenceConfig(**snakemake.params.cfg["evaluation.reference"]).model_dump(),
     )
-    sequence = np.load(inputs.truth[0], mmap_mode="r")[frames - snakemake.params.first]
+    sequence, _ = read_truth(*inputs.truth, rows=frames - snakemake.params.first, **place)
     return reference_of("truth", where, sequence, triangles, neutral)
 
 
-def true_curves(snakemake, frames):
+def true_curves(snakemake, frames, place):
     """Expression weights of the frames, a dict each; None where they are not known."""
     path = snakemake.input.get("curves")
-    if not path:
-        return None
-    curves = json.loads(Path(path).read_text(encoding="utf-8"))
-    return [curves[frame - snakemake.params.first] for frame in frames]
+    return read_curves(path, frames - snakemake.params.first, **place) if path else None
 
 
 def coarse_take(inputs, tracker, fit, frames, correction, fps):
@@ -150,12 +146,12 @@ def main(snakemake):
     )  # fmt: skip
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
-    against = reference(snakemake, tracker, correspondence, frames)
+    against = reference(snakemake, tracker, correspondence, frames, place)
     result = evaluate_take(
         sequences, frames, tracker, regions, against,
         options.clip_frames, options.min_clips,
         LipTolerances(options.touch_mm, options.gape_mm, options.through_mm),
-        true_curves(snakemake, frames),
+        true_curves(snakemake, frames, place),
     )  # fmt: skip
 
     sums = dict(result.sums)

@@ -11,6 +11,7 @@ from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
 from vermilion.evaluation.take import evaluate_reconstruction
+from vermilion.evaluation.truth import read_truth
 from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
@@ -20,7 +21,8 @@ from vermilion.tables import write_table
 
 
 def main(snakemake):
-    wildcards, inputs, cfg = snakemake.wildcards, snakemake.input, snakemake.params.cfg
+    inputs, cfg = snakemake.input, snakemake.params.cfg
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     options = MeasuresConfig(**cfg["evaluation.measures"])
     near = ReferenceConfig(**cfg["evaluation.reference"])
     cosine = np.cos(np.radians(near.max_normal_angle_deg))
@@ -33,8 +35,9 @@ def main(snakemake):
     sequence = np.asarray(read_sequence(inputs.accurate), dtype=np.float64)
     finite = np.isfinite(sequence).all(axis=(1, 2))
     frames, sequence = frames[finite], sequence[finite]
-    truth_triangles = np.load(inputs.truth[1])
-    truth = np.load(inputs.truth[0], mmap_mode="r")
+    truth, truth_triangles = read_truth(
+        *inputs.truth, rows=frames - snakemake.params.first, **place
+    )
     neutral_truth = truth[0].astype(np.float64)
     labels = transfer_lips(
         sequence[0], triangles, lips, neutral_truth, truth_triangles, near.max_distance_mm, cosine
@@ -43,9 +46,7 @@ def main(snakemake):
         sequence[0], vertex_normals(sequence[0], triangles), lips,
         Surface(neutral_truth, truth_triangles), labels, near.max_distance_mm, cosine,
     )  # fmt: skip
-    reference = reference_of(
-        "truth", where, truth[frames - snakemake.params.first], truth_triangles
-    )
+    reference = reference_of("truth", where, truth, truth_triangles)
     mouth = mask_on(
         sequence[0], triangles, correspondence.on_coarse(sequence[0]),
         correspondence.coarse_triangles[correspondence.mask],
@@ -59,7 +60,7 @@ def main(snakemake):
     )
     save_sums(snakemake.output.sums, sums, len(frames))
     table = measure_rows(
-        sums, wildcards.subject, wildcards.take, len(frames),
+        sums, *place.values(), len(frames),
         options.bootstrap_samples, options.confidence, options.seed,
     )  # fmt: skip
     print(table.to_string())
