@@ -51,9 +51,7 @@ def stage_overlays():
     """[stage, what, file] of the pictures that the page shows: the first chunk of every take."""
     rows = [["correspondence", s, f"{R}/subjects/{s}/correspondence/overlay/neutral.png"]
             for s in subjects("tattoo")]  # fmt: skip
-    rows += [
-        ["scan", s, f"{R}/subjects/{s}/scan/overlay/scan.png"] for s in CONFIG.tracking.scans
-    ]
+    rows += [["scan", s, f"{R}/subjects/{s}/scan/overlay/scan.png"] for s in CONFIG.tracking.scans]
     for folder, roles in STAGE_FOLDERS.items():
         for take in used_takes(roles):
             pattern = R + "/takes/{subject}/{take}/" + folder + "/overlay/{chunk}.png"

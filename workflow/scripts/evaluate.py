@@ -96,15 +96,51 @@ def coarse_take(inputs, tracker, fit, frames, correction, fps):
     )
 
 
-def contour_track(inputs, tracker, fit, take, correspondence, found, weights, options):
+def oracle(inputs, correspondence, around, rows):
+    """Meshes by the true layers, and the layers, of the `rows` of a take; None without layers."""
+    if not inputs.get("layers"):
+        return None, None
+    layers = read_chunks(inputs.layers, around.frames, ["layers", "displacement_mm", "valid"])
+    meshes = corrected_by_truth(correspondence.mask, take=around, **layers)[rows]
+    true = held_out.TrueLayers(correspondence.mask, layers["layers"][rows], layers["valid"][rows])
+    return meshes, true
+
+
+def regressors(inputs, around, rows):
+    """Name -> what each model makes of the `rows` of a take."""
+    regressed = {}
+    for path in inputs.models:
+        name = measure_name(Path(path).stem)
+        take = around.as_in_paper() if name.endswith("/paper") else around
+        regressed[name] = held_out.Regressed.of(load_model(path), take, rows)
+    return regressed
+
+
+def contour_track(inputs, tracker, fit, take, correspondence, contours, options):
     """The baseline of Lips16 section 6: lip shapes of the training, fitted to the contours."""
     shapes = LipShapes.load(inputs.shapes).on(
         correspondence.coarse_neutral_mm, tracker.triangles, take.seam_mm
     )
+    found, weights = FoundContours(**contours), fit.weights[fit.index_of(take.frames)]
     fitted = ContourTracker(tracker, shapes, found.outer_px.shape[1], options.ridge)
     return fitted.track(
         take.coarse_mm, take.rotation, take.translation_mm, weights, fit.camera, found
     )
+
+
+def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
+    """Sums by clip of every sequence: against the reference, in the picture, in the layers."""
+    found_px = contours["outer_px"], contours["inner_px"]
+    sums = {
+        name: result.sums[name]
+        + held_out.sums_of_contours(
+            sequence, take.coarse_mm, tracker, camera, *found_px, result.clips
+        )
+        for name, sequence in sequences.items()
+    }
+    for name, errors in layer_errors.items():
+        sums[name] += sums_of_layers(errors, result.clips)
+    return sums
 
 
 def main(snakemake):
@@ -127,23 +163,15 @@ def main(snakemake):
     asked_of_near = np.searchsorted(near, frames)
     take = around[asked_of_near]
 
-    sequences, true = {"base": take.coarse_mm}, None
-    if inputs.get("layers"):
-        layers = read_chunks(inputs.layers, near, ["layers", "displacement_mm", "valid"])
-        oracle = corrected_by_truth(correspondence.mask, take=around, **layers)
-        sequences["oracle"] = oracle[asked_of_near]
-        layers = {name: values[asked_of_near] for name, values in layers.items()}
-        true = held_out.TrueLayers(correspondence.mask, layers["layers"], layers["valid"])
-    regressed = {}
-    for path in inputs.models:
-        name = measure_name(Path(path).stem)
-        of = around.as_in_paper() if name.endswith("/paper") else around
-        regressed[name] = held_out.Regressed.of(load_model(path), of, asked_of_near)
+    by_truth, true = oracle(inputs, correspondence, around, asked_of_near)
+    regressed = regressors(inputs, around, asked_of_near)
     contours = read_chunks(inputs.features, frames, CONTOURS)
-    sequences["contour"] = contour_track(
-        inputs, tracker, fit, take, correspondence, FoundContours(**contours),
-        fit.weights[fit.index_of(frames)], ContourConfig(**cfg["evaluation.contour"]),
+    baseline = contour_track(
+        inputs, tracker, fit, take, correspondence, contours,
+        ContourConfig(**cfg["evaluation.contour"]),
     )  # fmt: skip
+    sequences = {"base": take.coarse_mm} | ({} if by_truth is None else {"oracle": by_truth})
+    sequences["contour"] = baseline
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
     against = reference(snakemake, tracker, correspondence, frames, place)
@@ -154,23 +182,10 @@ def main(snakemake):
         true_curves(snakemake, frames, place),
     )  # fmt: skip
 
-    sums = dict(result.sums)
-    for name, sequence in sequences.items():
-        sums[name] += held_out.sums_of_contours(
-            sequence,
-            take.coarse_mm,
-            tracker,
-            fit.camera,
-            contours["outer_px"],
-            contours["inner_px"],
-            result.clips,
-        )
-    layer_errors = {
-        name: held_out.layer_errors(of_model, take, true) for name, of_model in regressed.items()
-    }
+    layer_errors = {}
     if true is not None:
-        for name, errors in layer_errors.items():
-            sums[name] += sums_of_layers(errors, result.clips)
+        layer_errors = {n: held_out.layer_errors(of, take, true) for n, of in regressed.items()}
+    sums = all_sums(result, sequences, take, tracker, fit.camera, contours, layer_errors)
     save_sums(out.sums, sums, len(frames))
     table = measure_rows(
         sums, *place.values(), len(frames),

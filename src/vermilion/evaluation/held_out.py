@@ -104,14 +104,12 @@ def sums_of_contours(
     return sums_of_frames("mouth.contour", distance, clips)
 
 
-def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers | None) -> np.ndarray:
+def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers) -> np.ndarray:
     """RMS of regressed against true layer entries, weighted by area, (F,); NaN where one is unknown.
 
     Lips16's error in feature space.
     """
     errors = np.full(len(take.features), np.nan)
-    if true is None:
-        return errors
     common, ours, theirs = np.intersect1d(regressed.model.mask, true.mask, return_indices=True)
     known = np.isfinite(take.features).all(axis=1) & true.valid
     if known.any():
