@@ -12,7 +12,7 @@ help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make verify      find and remove damaged results of CONFIG"
-	@echo "make test        all tests; make test-quick: those that take seconds"
+	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make lint        style of Python and Snakemake files"
 	@echo "make docs        regenerate the configuration reference and schemas"
 	@echo "make clean       remove the environment and caches (results stay)"
