@@ -54,7 +54,7 @@ def run_stage(root, sizes, missing=()):
         LandmarkTrack(frames, points, np.full((size, 66), 0.9), valid).save(path)
         landmarks.append(path)
         chunks.append(frames)
-    cfg = TrackingConfig(meshes=MeshesConfig(overlay_frames=2)).model_dump(mode="json")
+    cfg = TrackingConfig(meshes=MeshesConfig(overlay_frames=1)).model_dump(mode="json")
     cfg = {f"tracking.{key}": value for key, value in cfg.items()}
     take = {"take": "t", "camera": "cam", "neutral": 0, "chunks": len(sizes)}
     names = {"subject": "s", "take": "t"}
