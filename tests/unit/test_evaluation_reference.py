@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from tests.unit.evaluation_face import sheet_face
+from vermilion.errors import InputError
 from vermilion.evaluation.closest import Surface, SurfacePoints, _closest_of
 from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, drift, reference_of, truth_of_vertices
@@ -81,6 +85,9 @@ def test_reference_follows_the_surface():
     )
     valid = reference_of("truth", unknown, frames, model.triangles).valid
     assert np.flatnonzero(~valid).tolist() == [5]
+    nowhere = replace(where, triangle=np.full_like(where.triangle, -1))
+    with pytest.raises(InputError, match="take rom: found no vertex with a point on the surface"):
+        reference_of("truth", nowhere, frames, model.triangles, subject="anna", take="rom")
 
 
 def test_drift_is_the_way_along_the_surface_and_not_off_it():

@@ -9,8 +9,8 @@ import pytest
 from vermilion.evaluation.contour_error import contour_error, distance_to_polyline
 from vermilion.evaluation.corrected import measure_name
 from vermilion.evaluation.errors import ClipSums
-from vermilion.evaluation.figures import map_frames
 from vermilion.evaluation.files import load_sums, save_sums
+from vermilion.evaluation.held_out import shown_rows
 from vermilion.evaluation.measures import seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.evaluation.table1 import in_order, kind_of, table1
@@ -129,8 +129,8 @@ def test_contour_error_is_per_interocular_distance():
 
 def test_frames_of_error_maps_are_the_worst_of_equal_stretches():
     error = np.array([1.0, 3, 2, 9, 1, 1, np.nan, 4, 5])
-    assert map_frames(error, 3).tolist() == [1, 3, 8]
-    assert map_frames(error[:2], 5).tolist() == [0, 1]
+    assert shown_rows(error, 3).tolist() == [1, 3, 8]
+    assert shown_rows(error[:2], 5).tolist() == [0, 1]
 
 
 def test_page_escapes_what_people_typed():

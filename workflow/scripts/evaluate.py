@@ -57,7 +57,9 @@ def reference(snakemake, tracker, correspondence, frames, place):
         vertices = read_frames(inputs.accurate, frames)
         neutral = read_frames(inputs.accurate, [snakemake.params.first])[0]
         where = held_out.points_on_h(correspondence)
-        return reference_of("H", where, vertices, correspondence.accurate_triangles, neutral)
+        return reference_of(
+            "H", where, vertices, correspondence.accurate_triangles, neutral, **place
+        )
     (neutral,), triangles = read_truth(*inputs.neutral_truth, rows=np.array([0]), **place)
     where = held_out.points_on_truth(
         correspondence,
@@ -69,7 +71,7 @@ def reference(snakemake, tracker, correspondence, frames, place):
         **ReferenceConfig(**snakemake.params.cfg["evaluation.reference"]).model_dump(),
     )
     sequence, _ = read_truth(*inputs.truth, rows=frames - snakemake.params.first, **place)
-    return reference_of("truth", where, sequence, triangles, neutral)
+    return reference_of("truth", where, sequence, triangles, neutral, **place)
 
 
 def true_curves(snakemake, frames, place):

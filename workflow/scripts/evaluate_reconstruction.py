@@ -5,6 +5,7 @@ import numpy as np
 from vermilion.camera import read_cameras
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.correspondence.correspondence import Correspondence
+from vermilion.errors import InputError
 from vermilion.evaluation.closest import Surface
 from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
@@ -34,6 +35,13 @@ def main(snakemake):
     frames = frames_of(inputs.accurate)
     sequence = np.asarray(read_sequence(inputs.accurate), dtype=np.float64)
     finite = np.isfinite(sequence).all(axis=(1, 2))
+    if not finite.any():
+        raise InputError(
+            "no reconstructed frame",
+            "at least the neutral",
+            "See multiview/report.html of the take.",
+            **place,
+        )
     frames, sequence = frames[finite], sequence[finite]
     truth, truth_triangles = read_truth(
         *inputs.truth, rows=frames - snakemake.params.first, **place
@@ -46,7 +54,7 @@ def main(snakemake):
         sequence[0], vertex_normals(sequence[0], triangles), lips,
         Surface(neutral_truth, truth_triangles), labels, near.max_distance_mm, cosine,
     )  # fmt: skip
-    reference = reference_of("truth", where, truth, truth_triangles)
+    reference = reference_of("truth", where, truth, truth_triangles, **place)
     mouth = mask_on(
         sequence[0], triangles, correspondence.on_coarse(sequence[0]),
         correspondence.coarse_triangles[correspondence.mask],

@@ -27,13 +27,6 @@ def line_of(regressor: str) -> str:
     return "--" if "/" in regressor else "-"
 
 
-def map_frames(error_mm: np.ndarray, count: int) -> np.ndarray:
-    """Which frames (F,) mm to draw: the worst one in each of `count` equal stretches."""
-    stretches = np.array_split(np.arange(len(error_mm)), min(count, len(error_mm)))
-    filled = np.nan_to_num(error_mm)
-    return np.array([part[np.argmax(filled[part])] for part in stretches if len(part)])
-
-
 def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
     """Errors over time as PNG: mouth, vermilion, and the gap between the lips.
 

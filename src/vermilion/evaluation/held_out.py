@@ -13,7 +13,6 @@ from vermilion.evaluation.closest import SurfacePoints
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
-from vermilion.evaluation.figures import map_frames
 from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
@@ -120,6 +119,13 @@ def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers) -> np
     return errors
 
 
+def shown_rows(error_mm: np.ndarray, count: int) -> np.ndarray:
+    """Rows, ascending, of the worst frame (F,) mm in each of `count` equal stretches."""
+    stretches = np.array_split(np.arange(len(error_mm)), min(count, len(error_mm)))
+    filled = np.nan_to_num(error_mm)
+    return np.array([part[np.argmax(filled[part])] for part in stretches if len(part)])
+
+
 def shown_arrays(
     result: TakeResult,
     take: CoarseTake,
@@ -144,7 +150,7 @@ def shown_arrays(
         centre_px (n, 2) of the lips and px_per_mm (n,) in the picture.
     """
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
-    chosen = map_frames(base, count)
+    chosen = shown_rows(base, count)
     rotations, translations = (part[chosen] for part in result.head)
     names = [name for name in result.aligned_mm if "/" not in name]
     of_truth = {"base": neutral_mm, "contour": neutral_mm}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -128,22 +128,23 @@ def surface_stretch(
 def stretch_bar(width_px: int) -> np.ndarray:
     """(46, width, 3) uint8: the colours of surface stretch."""
     share = 100 * _STRETCH
-    return colour_bar(width_px, _stretch_colours, (f"-{share:g} %", "0", f"+{share:g} % and over"))
+    texts = (f"-{share:g} %", "0", f"+{share:g} % and over")
+    return colour_bar(width_px, lambda shares: _stretch_colours((2 * shares - 1) * _STRETCH), texts)
 
 
 def error_bar(width_px: int, scale_mm: float) -> np.ndarray:
     """(46, width, 3) uint8: the colours of 0 to `scale_mm`."""
     texts = ("0", f"{0.5 * scale_mm:g}", f"{scale_mm:g} mm and over")
-    return colour_bar(
-        width_px, lambda values: colour_map(0.5 + 0.5 * values / _STRETCH, 0, 1), texts
-    )
+    return colour_bar(width_px, lambda shares: colour_map(shares, 0, 1), texts)
 
 
-def colour_bar(width_px: int, colours_of, texts: tuple[str, str, str]) -> np.ndarray:
-    """A ramp of `colours_of` (values of -`_STRETCH` to `_STRETCH`) with three labels."""
+def colour_bar(
+    width_px: int, colours_of: Callable[[np.ndarray], np.ndarray], texts: tuple[str, str, str]
+) -> np.ndarray:
+    """A ramp of `colours_of` (shares (n,) from 0 to 1 -> (n, 3)) with three labels."""
     bar = np.full((46, width_px, 3), 255, dtype=np.uint8)
     left, length = 12, min(360, width_px - 90)
-    ramp = colours_of(np.linspace(-_STRETCH, _STRETCH, length))
+    ramp = colours_of(np.linspace(0.0, 1.0, length))
     bar[8:22, left : left + length] = np.rint(255 * ramp)
     for share, text in zip((0.0, 0.5, 1.0), texts, strict=True):
         place = (left + round(share * length) - (0 if share == 0 else 8), 38)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.errors import InputError
 from vermilion.evaluation.closest import Surface, SurfacePoints
 from vermilion.mesh import triangle_normals, vertex_normals
 
@@ -47,14 +48,27 @@ def reference_of(
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
     neutral_mm: np.ndarray | None = None,
+    **place,
 ) -> Reference:
     """Follow `where` (V points on the surface) through the surface's frames (F, S, 3).
 
-    `neutral_mm` (S, 3) is the surface at the neutral.
-
     The surface is cropped to the surroundings of the points in the first frame: the back of a head
     is no neighbour of a face.
+
+    Args:
+        neutral_mm: (S, 3) the surface at the neutral; None: the first frame is it.
+        place: subject and take, for messages.
+
+    Raises:
+        InputError: no vertex has a point on the surface.
     """
+    if not where.found.any():
+        raise InputError(
+            "no vertex with a point on the surface that it is measured against",
+            "truth in the world of the rig, in millimetres, whose first frame is the neutral",
+            "Look at evaluation.truth, and at evaluation.reference for what counts as near.",
+            **place,
+        )
     points = where.on(np.asarray(vertices_mm, dtype=np.float64), triangles)
     first = points[0][np.isfinite(points[0]).all(axis=1)]
     low, high = first.min(axis=0) - _CROP_MARGIN_MM, first.max(axis=0) + _CROP_MARGIN_MM

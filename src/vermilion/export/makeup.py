@@ -19,6 +19,8 @@ from vermilion.raycast import RayCaster, interpolate
 
 _SMOOTH = 1.5  # vertices of the contour
 _LUMA = np.array([0.2126, 0.7152, 0.0722])
+#: The checkerboard lies on a cylinder round the head: its radius, its axis behind the face's middle.
+_CYLINDER_MM, _AXIS_BEHIND_MM = 75.0, 70.0
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,9 @@ class MakeUp:
         self.triangles = model.triangles[keep[model.triangles].all(axis=1)]
         skin = (model.regions["face"] & ~model.regions["mouth_inner"]).astype(float)
         self.light, self.pigments, self.checker_mm = light, pigments, checker_mm
+        # Of each vertex: albedo (3), whether it is skin, place in the neutral (3), depth in the lips.
         self.values = np.column_stack([albedo, skin, neutral_mm, lip_outline(model, neutral_mm)])
-        self.axis_mm = np.median(neutral_mm[:, 2]) - 70.0
+        self.axis_mm = np.median(neutral_mm[:, 2]) - _AXIS_BEHIND_MM
 
     def draw(
         self, picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray
@@ -180,7 +183,7 @@ class MakeUp:
 
     def _checkerboard(self, part, found, light, trusted):
         x, y, z = (found[..., k] for k in (4, 5, 6))
-        around = np.arctan2(x, z - self.axis_mm) * 75.0
+        around = np.arctan2(x, z - self.axis_mm) * _CYLINDER_MM
         square = (np.floor(around / self.checker_mm) + np.floor(y / self.checker_mm)) % 2
         colour = np.where(square[..., None] > 0, [0.75, 0.75, 0.75], [0.05, 0.09, 0.22])
         cover = 0.75 * trusted[..., None]

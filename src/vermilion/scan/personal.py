@@ -16,7 +16,8 @@ from vermilion.scan.landmarks import LEAST_GIVEN, ScanLandmarks
 from vermilion.scan.registration import WAVELENGTHS_MM, register_scan
 from vermilion.scan.transfer import DeformationTransfer
 
-_LEAST_COVERED = 0.5
+#: Share of the face that a scan must cover, and what a scan is warned of: distance to it, share met.
+_LEAST_COVERED, _FAR_MM, _LITTLE_MET = 0.5, 0.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,9 @@ class PersonalModel:
     def quality(self) -> QualityRow:
         """A row with a reason where the figures look wrong."""
         figures, reasons = self.figures(), []
-        if figures["distance_mean_mm"] > 0.5:
+        if figures["distance_mean_mm"] > _FAR_MM:
             reasons.append(f"the model lies {figures['distance_mean_mm']:.2f} mm from the scan")
-        if figures["met_share"] < 0.8:
+        if figures["met_share"] < _LITTLE_MET:
             reasons.append(f"the scan covers only {figures['met_share']:.0%} of the face")
         return QualityRow(0, not reasons, "; ".join(reasons), figures)
 
