@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+from vermilion.workflow.fingerprint import imported_files
+
 from .conftest import ROOT, Project
 
 RULES = sorted((ROOT / "workflow" / "rules").glob("*.smk"))
@@ -44,6 +46,18 @@ def test_only_the_evaluation_reads_external_truth(fresh_project, data_root):
     run = Project(fresh_project.folder, "config/sample.yaml").snakemake("--dry-run")
     jobs = jobs_of(run.stdout + run.stderr)
     assert {rule for rule, inputs, _ in jobs if "capture-sample-truth" in inputs} == MEASURING
+
+
+def test_a_change_of_the_evaluation_reruns_nothing_that_comes_before_it():
+    measuring = {
+        path.stem
+        for path in SCRIPTS
+        if any(found.parent.name == "evaluation" for found in imported_files(path))
+    }
+    assert measuring == {
+        "evaluate", "evaluate_reconstruction", "evaluation_figures", "evaluation_lip_shapes",
+        "measures", "summary",
+    }  # fmt: skip
 
 
 def test_no_script_reads_configuration_or_other_paths_by_itself():
