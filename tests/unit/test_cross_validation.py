@@ -111,6 +111,22 @@ def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
     np.testing.assert_allclose(bias_of_a_stranger(alike[:1], neutral), alike[0] / 2)
 
 
+def test_what_people_share_in_layers_is_kept_though_their_displacements_differ():
+    """A stranger's place is not guessed from people who lie now here, now there."""
+    rng = np.random.default_rng(3)
+    persons, features = np.repeat(np.arange(4), 30), rng.normal(size=(120, 5))
+    features[::30] = 0.0
+    layers = np.ones((120, 50)) + 0.01 * rng.normal(size=(120, 50))
+    places = 3.0 * rng.normal(size=(4, 80))[persons]
+    targets = np.concatenate([layers, places], axis=1)
+    apart = AffineRegressor(10.0).fit(features, targets, persons=persons, n_layers=50)
+    neutral = apart.predict(np.zeros((1, 5)))[0]
+    np.testing.assert_allclose(neutral[:50], 1.0, atol=0.05)
+    assert np.abs(neutral[50:]).mean() < 0.5
+    together = AffineRegressor(10.0).fit(features, targets, persons=persons)
+    assert np.abs(together.predict(np.zeros((1, 5)))[0][:50] - 1.0).mean() > 0.1
+
+
 def test_choice_takes_the_smoothest_within_one_standard_error(data):
     features, targets = data
     clips = clips_of(np.zeros(120), 15, 5)

@@ -10,8 +10,8 @@ import pytest
 from tests.unit.evaluation_face import sheet_face
 from vermilion.errors import InputError
 from vermilion.evaluation.closest import Surface, SurfacePoints, _closest_of
-from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, drift, reference_of, truth_of_vertices
+from vermilion.faces.lips import lip_labels
 from vermilion.mesh import vertex_normals
 
 

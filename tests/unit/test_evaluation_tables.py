@@ -120,11 +120,13 @@ def test_contour_error_is_per_interocular_distance():
     square = np.array([[-20.0, -20, 500], [20, -20, 500], [20, 20, 500], [-20, 20, 500]])
     found = camera.project(square)[None] + [[[0.0, 4.0]]]
     error = contour_error(
-        square[None], camera, [np.arange(4)], [found], interocular_px=np.array([80.0])
+        square[None], camera, np.arange(4), None, found, found, interocular_px=np.array([80.0])
     )
     assert error[0] == pytest.approx(4.0 / 80.0 / 2, abs=1e-6)  # two corners slide along the sides
     nothing = np.full((1, 4, 2), np.nan)
-    assert np.isnan(contour_error(square[None], camera, [np.arange(4)], [nothing], np.ones(1)))
+    assert np.isnan(
+        contour_error(square[None], camera, np.arange(4), None, nothing, nothing, np.ones(1))
+    )
 
 
 def test_frames_of_error_maps_are_the_worst_of_equal_stretches():

@@ -86,6 +86,19 @@ def test_closed_mouth_gives_lips_that_meet():
     assert abs(gap) < 0.01
 
 
+def test_a_weak_ridge_beside_the_teeth_is_not_passed_over_for_the_other_lip():
+    """The upper lip's border is faint, the lower one clear, the coarse mouth as open as the true."""
+    _, _, label = draw_mouth(9.0, 26.0)
+    model, camera = mouth_model(9.0, 26.0), facing_camera()
+    inner, outer = ridge_maps(label)
+    corner_row = label.inner.points_px[:, 1].mean()
+    inner = inner.copy()
+    inner[: int(corner_row) - 2] *= 0.05
+    found = sampler(model).find(model.neutral_mm, camera, (inner, outer))
+    middle = np.arange(12, 29)
+    assert (found.inner_px[middle, 1] < corner_row - 4).all()
+
+
 @pytest.mark.parametrize(
     "view",
     [

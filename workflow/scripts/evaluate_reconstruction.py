@@ -8,12 +8,13 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.errors import InputError
 from vermilion.evaluation.closest import Surface
 from vermilion.evaluation.files import save_sums
-from vermilion.evaluation.masks import lip_labels, mask_on, regions_of_mask
+from vermilion.evaluation.masks import mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
 from vermilion.evaluation.take import evaluate_reconstruction
 from vermilion.evaluation.truth import read_truth
 from vermilion.evaluation.visible import cameras_that_see
+from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
 from vermilion.logfile import log_to
 from vermilion.mesh import vertex_normals

@@ -48,7 +48,10 @@ class ContourFeaturesConfig(StageConfig):
         0.2, ge=0, le=1, description="Likelihood of a maximum that counts as found."
     )
     model_weight: float = Field(
-        1.0, ge=0, description="Cost of a contour one reach away from the model's (log-likelihood)."
+        2.0,
+        ge=0,
+        description="Cost of a contour one reach away from the model's (log-likelihood). Of the inner one it "
+        "is 9 times as much there, and half as much again at a quarter of a reach.",
     )
     smooth_weight: float = Field(
         0.6, ge=0, description="Cost of a slope of 1 between neighbouring samples (log-likelihood)."

@@ -28,6 +28,16 @@ class LipSamples:
     points: MeshPoints
     length_mm: np.ndarray
 
+    def with_inner(self, samples: np.ndarray, points: MeshPoints) -> LipSamples:
+        """The same with inner samples (k,) at other points (k): those that form the contour now."""
+        vertices, weights = (
+            np.pad(part, ((0, 0), (0, points.vertices.shape[1] - part.shape[1])), mode=mode)
+            for part, mode in ((self.points.vertices, "edge"), (self.points.weights, "constant"))
+        )
+        rows = len(self.points) // 2 + samples
+        vertices[rows], weights[rows] = points.vertices, points.weights
+        return LipSamples(MeshPoints(vertices, weights), self.length_mm)
+
     @classmethod
     def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
         """Of both rings of a face, with lengths on a person's neutral (V, 3)."""

@@ -19,6 +19,7 @@ from vermilion.correction.repose import ANCHORS, moved, repose_motion, smoothed_
 from vermilion.correction.rotations import rotation_matrix
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import interocular_px
+from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 from vermilion.landmarks.scheme import EYE_CORNERS
 
@@ -47,8 +48,10 @@ class PictureFit:
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
         self._crossings = LipCrossings(face)
-        named = np.union1d(self._samples.points.vertices, self._crossings.vertices)
-        self._solver = ConstraintSolver(integrator, named)
+        self._occluding = OccludingContour.of(face)
+        lips = np.union1d(self._samples.points.vertices, self._occluding.points.vertices)
+        self._lips = np.intersect1d(lips, integrator.free)
+        self._solver = ConstraintSolver(integrator, np.union1d(lips, self._crossings.vertices))
 
     @classmethod
     def of(
@@ -75,15 +78,19 @@ class PictureFit:
         """
         lines = picture.lines()
         unit_px = np.array([interocular_px(v[self._eyes], picture.camera) for v in coarse_mm])
-        if self.settings.repose:
+        seen = [
+            self._seen(corrected[f], rotation[f], translation_mm[f], picture, f)
+            for f in range(len(corrected))
+        ]
+        if self.settings.repose and seen:
             rotation, translation_mm = self._reposed(
-                corrected, coarse_mm, rotation, translation_mm, picture, lines, unit_px
+                corrected, coarse_mm, rotation, translation_mm, picture, lines, seen, unit_px
             )
         corrected = np.array(corrected)
         constraints = [
             self._constrained(
                 corrected[f], rotation[f], translation_mm[f], picture, f,
-                tuple(part[f] for part in lines), float(unit_px[f]),
+                tuple(part[f] for part in lines), seen[f], float(unit_px[f]),
             )
             for f in range(len(corrected))
         ]  # fmt: skip
@@ -92,14 +99,17 @@ class PictureFit:
             corrected[:, self._free] += self._solver.moves(list(rows), list(forces))
         return corrected @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
 
-    def _reposed(self, corrected, coarse_mm, rotation, translation_mm, picture, lines, unit_px):
+    def _reposed(
+        self, corrected, coarse_mm, rotation, translation_mm, picture, lines, seen, unit_px
+    ):
         """`world_from_head` after the corrected heads are laid on the picture."""
         turn = np.swapaxes(rotation, 1, 2)
         pivot = self._pivot @ turn + translation_mm
+        samples = np.stack([s.points.of(v) for s, v in zip(seen, corrected, strict=True)])
         motion = repose_motion(
             corrected[:, self._anchors] @ turn + translation_mm[:, None],
             picture.camera.project(coarse_mm[:, self._anchors]),
-            self._samples.points.of(corrected) @ turn + translation_mm[:, None],
+            samples @ turn + translation_mm[:, None],
             lines, pivot, unit_px, picture.camera,
         )  # fmt: skip
         known = lines[2].mean(axis=1) >= _LEAST_KNOWN
@@ -108,14 +118,24 @@ class PictureFit:
         return rotation_matrix(motion[:, :3]) @ rotation, origin
 
     def _constrained(
-        self, vertices, rotation, translation_mm, picture, f, lines, unit_px
+        self, vertices, rotation, translation_mm, picture, f, lines, seen, unit_px
     ) -> tuple[Rows, np.ndarray]:
         """Rows of a frame and the forces along them."""
         weight, n = self.settings.contour_weight, picture.inner_px.shape[1]
-        rows = contour_rows(
-            self._samples, vertices, rotation, translation_mm, picture.camera, lines,
-            weight or 1.0, self.settings.contour_robust_mm,
-        )  # fmt: skip
+        place = rotation, translation_mm
+        robust_mm = self.settings.contour_robust_mm
+
+        def rows_of(samples: LipSamples) -> Rows:
+            return contour_rows(
+                samples, vertices, *place, picture.camera, lines, weight or 1.0, robust_mm
+            )
+
+        rows = rows_of(seen)
+        if weight > 0:  # which points form the inner contour, once more at about the result
+            now = np.array(vertices)
+            moves = self._solver.near_moves(rows, self._solver.multipliers(rows), self._lips)
+            now[self._lips] += moves
+            rows = rows_of(self._seen(now, *place, picture, f))
         if weight == 0:
             rows = rows[:0]
         if not self.settings.contact:
@@ -128,6 +148,16 @@ class PictureFit:
                 view / np.linalg.norm(view), weight, self.settings.closed,
             )  # fmt: skip
         return self._parted(vertices, rows)
+
+    def _seen(self, vertices, rotation, translation_mm, picture, f) -> LipSamples:
+        """Samples on the contours as they are seen: of the inner one, what hides the mouth now."""
+        pixels = picture.camera.project(
+            self._occluding.points.of(vertices) @ rotation.T + translation_mm
+        )
+        samples, points, _ = self._occluding.match(
+            pixels, picture.outer_px[f], picture.inner_px[f], picture.inner_found[f]
+        )
+        return self._samples.with_inner(samples, self._occluding.points[points])
 
     def _parted(self, vertices: np.ndarray, rows: Rows) -> tuple[Rows, np.ndarray]:
         """Rows and forces that leave no lip in the other: an active set, found again each round.

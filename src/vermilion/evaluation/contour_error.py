@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.camera import Camera
+from vermilion.features.occluding import OccludingContour
 
 
 def distance_to_polyline(points_px: np.ndarray, line_px: np.ndarray, closed: bool) -> np.ndarray:
@@ -25,27 +26,34 @@ def distance_to_polyline(points_px: np.ndarray, line_px: np.ndarray, closed: boo
 def contour_error(
     sequence_mm: np.ndarray,
     camera: Camera,
-    loops: list[np.ndarray],
-    found_px: list[np.ndarray],
+    outer_loop: np.ndarray,
+    occluding: OccludingContour | None,
+    outer_px: np.ndarray,
+    inner_px: np.ndarray,
     interocular_px: np.ndarray,
 ) -> np.ndarray:
-    """Mean distance of the contour points in the picture to the projected loops, (F,).
+    """Mean distance of the contour points in the picture to the mesh's contours, (F,).
 
-    In pixels per pixel of inter-ocular distance.
+    In pixels per pixel of inter-ocular distance. The outer contour is a loop of the mesh. The inner
+    one is what hides the mouth: of each point in the picture, how much higher or lower that is.
 
     Args:
         sequence_mm: (F, V, 3) in the camera's world.
-        loops: closed loops of vertices (the outer and the inner contour).
-        found_px: for each loop (F, n, 2) points in the picture; NaN where none was found.
+        outer_loop: closed loop of vertices.
+        occluding: of the same topology; None: the outer contour alone.
+        outer_px, inner_px: (F, n, 2) rings in the picture; NaN where none was found.
         interocular_px: (F,).
     """
     result = np.full(len(sequence_mm), np.nan)
-    for frame, vertices in enumerate(sequence_mm):
-        distances = []
-        for loop, points in zip(loops, found_px, strict=True):
-            seen = points[frame][np.isfinite(points[frame]).all(axis=1)]
-            line = camera.project(np.asarray(vertices[loop], dtype=float))
-            distances.append(distance_to_polyline(seen, line, closed=True))
+    for frame, vertices in enumerate(np.asarray(sequence_mm, dtype=float)):
+        outer, inner = outer_px[frame], inner_px[frame]
+        seen = outer[np.isfinite(outer).all(axis=1)]
+        distances = [distance_to_polyline(seen, camera.project(vertices[outer_loop]), closed=True)]
+        if occluding is not None and np.isfinite(outer).all():
+            pixels = camera.project(occluding.points.of(vertices))
+            known = np.isfinite(inner).all(axis=1)
+            samples, points, up = occluding.match(pixels, outer, inner, known)
+            distances.append(np.abs((inner[samples] - pixels[points]) @ up))
         everything = np.concatenate(distances)
         if np.isfinite(everything).any():
             result[frame] = np.nanmean(everything) / interocular_px[frame]

@@ -20,14 +20,13 @@ from scipy.optimize import lsq_linear
 
 from vermilion.camera import Camera
 from vermilion.correction.head import head_from_world, world_from_head
-from vermilion.evaluation.lips import lip_sides
 from vermilion.faces.model import FaceModel
+from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 from vermilion.features.search import inward_normals, smoothed_ring
 from vermilion.mesh_points import MeshPoints
 
 _ROUNDS = 8
-_SUBDIVISIONS = 5
 _LEAST_POINTS = 20
 _LEAST_MOVE_MM = 0.2
 
@@ -67,7 +66,7 @@ class ContourTracker:
         self.penalty = np.sqrt(ridge * size)
         ring = lip_rings(model, n_samples)[0]
         self.outer = MeshPoints.on_edges(ring.start, ring.end, ring.fraction)
-        self.lips, self.sides = _lip_points(model)
+        self.occluding = OccludingContour.of(model)
 
     def track(
         self,
@@ -111,9 +110,12 @@ class ContourTracker:
         for _ in range(_ROUNDS):
             mesh = base_mm + np.tensordot(weights, self.displacements_mm, 1)
             parts = [view.equations(outer.of(mesh), outer_basis, found.outer_px[f, seen], across)]
-            inner, rows, up = self._occluding(view, mesh, found, f)
+            inner, rows, up = self.occluding.match(
+                view.project(self.occluding.points.of(mesh)), found.outer_px[f],
+                found.inner_px[f], found.inner_found[f],
+            )  # fmt: skip
             if len(inner):
-                occluding = self.lips[rows]
+                occluding = self.occluding.points[rows]
                 parts.append(
                     view.equations(
                         occluding.of(mesh),
@@ -136,33 +138,6 @@ class ContourTracker:
             if done:
                 break
         return weights
-
-    def _occluding(self, view: _FrameView, mesh_mm, found: FoundContours, f: int):
-        """(found inner samples, rows of the lips' points that form the contour there, up (2,)).
-
-        In each column of the mouth, the lowest point of the upper lip and the highest of the lower.
-        """
-        outer, inner = found.outer_px[f], found.inner_px[f]
-        half = len(outer) // 2
-        along = outer[half] - outer[0]
-        width = np.linalg.norm(along)
-        along = along / max(width, 1e-9)
-        up = np.array([-along[1], along[0]])
-        up = up * np.sign(((outer[1:half] - outer[half + 1 :][::-1]) @ up).sum())
-        pixels = view.project(self.lips.of(mesh_mm)) - outer[0]
-        column_px = max(width / 40, 1e-9)
-        column = np.floor(pixels @ along / column_px).astype(int)
-        wanted = np.floor((inner - outer[0]) @ along / column_px).astype(int)
-        rows, points = [], []
-        for side, samples, sign in ((1, range(1, half), 1.0), (2, range(half + 1, 2 * half), -1.0)):
-            ids = np.flatnonzero(self.sides == side)
-            order = ids[np.lexsort((sign * (pixels[ids] @ up), column[ids]))]
-            columns, first = np.unique(column[order], return_index=True)
-            extreme = dict(zip(columns.tolist(), order[first].tolist(), strict=True))
-            kept = [k for k in samples if found.inner_found[f, k] and int(wanted[k]) in extreme]
-            rows += kept
-            points += [extreme[int(wanted[k])] for k in kept]
-        return np.array(rows, dtype=int), np.array(points, dtype=int), up
 
 
 @dataclass(frozen=True)
@@ -190,14 +165,3 @@ class _FrameView:
         matrix = np.einsum("knd,nd->nk", basis_mm, ray) / px_per_mm
         right = ((wanted_px - self.project(points_mm)) * across).sum(axis=1) / px_per_mm
         return matrix, right
-
-
-def _lip_points(model: FaceModel) -> tuple[MeshPoints, np.ndarray]:
-    """A grid on every triangle of the lips and of a little of their inside, and its sides (N,)."""
-    sides = lip_sides(model)[model.triangles]
-    whole = (sides == sides[:, :1]).all(axis=1) & (sides[:, 0] > 0)
-    steps = np.arange(_SUBDIVISIONS + 1) / _SUBDIVISIONS
-    grid = np.array([(a, b, 1 - a - b) for a in steps for b in steps if a + b <= 1 + 1e-9])
-    corners = np.repeat(model.triangles[whole], len(grid), axis=0)
-    weights = np.tile(grid, (int(whole.sum()), 1))
-    return MeshPoints(corners, weights), np.repeat(sides[whole, 0], len(grid))

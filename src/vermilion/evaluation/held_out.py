@@ -13,10 +13,11 @@ from vermilion.evaluation.closest import SurfacePoints
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
-from vermilion.evaluation.masks import lip_labels
 from vermilion.evaluation.reference import Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
+from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
+from vermilion.features.occluding import OccludingContour
 from vermilion.mesh import triangle_areas
 from vermilion.regression.model import LipModel
 
@@ -96,8 +97,10 @@ def sums_of_contours(
     distance = contour_error(
         sequence_mm,
         camera,
-        [tracker.outer_contour, tracker.inner_contour],
-        [outer_px, inner_px],
+        tracker.outer_contour,
+        OccludingContour.of(tracker),
+        outer_px,
+        inner_px,
         np.linalg.norm(eyes[:, 0] - eyes[:, 1], axis=1),
     )
     return sums_of_frames("mouth.contour", distance, clips)

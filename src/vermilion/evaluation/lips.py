@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.evaluation.masks import lip_labels
+from vermilion.faces.lips import lip_labels, lip_sides
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import adjacency
 
 N_COLUMNS = 7
-_GROW_RINGS = 2
 
 
 @dataclass(frozen=True)
@@ -28,17 +26,6 @@ class LipTolerances:
     touch_mm: float = 0.3
     gape_mm: float = 1.0
     through_mm: float = 0.05
-
-
-def lip_sides(model: FaceModel) -> np.ndarray:
-    """(V,) int8: 1 upper lip, 2 lower, 0 neither; the vermilion and a little of the lips' inside."""
-    labels = lip_labels(model)
-    neighbours = adjacency(model.triangles, model.n_vertices)
-    for _ in range(_GROW_RINGS):
-        upper, lower = (neighbours @ (labels == side) > 0 for side in (1, 2))
-        free = (labels == 0) & model.regions["mouth_inner"] & ~(upper & lower)
-        labels = np.where(free & upper, 1, np.where(free & lower, 2, labels)).astype(np.int8)
-    return labels
 
 
 def columns_of(model: FaceModel) -> np.ndarray:

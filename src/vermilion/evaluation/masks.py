@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.evaluation.closest import Surface
+from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import vertex_areas
 
@@ -37,14 +38,6 @@ class Regions:
         """The regions without the vertices that have no counterpart in the truth."""
         weights = {name: np.where(valid, w, 0.0) for name, w in self.weights.items()}
         return Regions(weights, np.where(valid, self.rest, 0.0), self.lips)
-
-
-def lip_labels(model: FaceModel) -> np.ndarray:
-    """(V,) int8: 1 upper vermilion, 2 lower, 0 elsewhere."""
-    labels = np.zeros(model.n_vertices, dtype=np.int8)
-    labels[model.regions["vermilion_upper"]] = 1
-    labels[model.regions["vermilion_lower"]] = 2
-    return labels
 
 
 def regions_of_mask(

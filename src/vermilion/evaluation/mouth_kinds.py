@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vermilion.evaluation.lips import aperture_mm, columns_of, lip_gaps, lip_sides
+from vermilion.evaluation.lips import aperture_mm, columns_of, lip_gaps
 from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 
 KINDS = ("kiss", "roll", "press", "open", "smile", "speech")

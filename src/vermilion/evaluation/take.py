@@ -27,12 +27,12 @@ from vermilion.evaluation.lips import (
     aperture_mm,
     columns_of,
     lip_depths,
-    lip_sides,
 )
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.progress import progress
 

@@ -82,6 +82,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         targets: np.ndarray,
         sequences: np.ndarray | None = None,
         persons: np.ndarray | None = None,
+        n_layers: int | None = None,
         **chosen,
     ) -> Self:
         """Fit on features (F, M) and targets (F, K).
@@ -90,6 +91,8 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
             sequences: (F,) labels of the sequences, frames in order of time; one if None.
             persons: (F,) in 0 .. G - 1, each person starting at their neutral: a bias for each. None:
                 the paper's single bias.
+            n_layers: the first so many targets are layers, the others displacements: what people have
+                in common is judged of each kind by itself. None: all are of one kind.
             chosen: what the subclass lets the caller choose (`fit_inputs`).
         """
         if targets.ndim != 2 or len(features) != len(targets):
@@ -109,7 +112,10 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         if persons is not None:
             first = np.unique(persons, return_index=True)[1]
             neutral = (design[first].mean(axis=0) @ self.coefficients_) @ self.basis_
-            self.bias_ = bias_of_a_stranger(biases, neutral).astype(weights.dtype)
+            kinds = np.split(np.arange(targets.shape[1]), [n_layers or targets.shape[1]])
+            self.bias_ = np.concatenate(
+                [bias_of_a_stranger(biases[:, k], neutral[k]) for k in kinds if len(k)]
+            ).astype(weights.dtype)
         return self
 
     def fit_inputs(

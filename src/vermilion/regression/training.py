@@ -189,7 +189,7 @@ def train(
         estimator.set_params(beta=float(curve.betas[row]))
     places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
     targets = np.concatenate([data.layers, places], axis=1)
-    estimator.fit(features, targets, data.sequences, persons)
+    estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
     used = {
         take: data.frames[data.sequences == k]
