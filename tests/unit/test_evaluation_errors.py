@@ -79,6 +79,23 @@ def test_known_offset_of_the_lips_is_found_and_halved(face):
     assert value["surface_error_median_mm", "vermilion", "base"] <= 3.0
 
 
+def test_a_wrong_person_that_moves_rightly_has_no_moving_error(face):
+    """A fixed offset of the mouth is wrong in every frame alike; a motion that is missing is not."""
+    model, regions = face
+    truth = moving(model)
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+    other, still = truth.copy(), np.repeat(truth[:1], len(FRAMES), axis=0)
+    other[:, lips, 2] += 3.0
+    _, value = evaluate(model, regions, {"base": other, "still": still}, turned(truth, 10.0, 5.0))
+    assert value["vertex_error_mean_mm", "vermilion", "base"] == pytest.approx(3.0, abs=1e-6)
+    assert value["moving_error_mm", "vermilion", "base"] < 1e-6
+    opening = np.array([0.0, 2.0, 4.0, 3.0, 1.0, 0.0])
+    lower = regions.weights["vermilion"][model.regions["vermilion_lower"]].sum()
+    share = lower / regions.weights["vermilion"].sum()
+    expected = share * np.abs(opening - opening.mean()).mean()
+    assert value["moving_error_mm", "vermilion", "still"] == pytest.approx(expected, rel=0.05)
+
+
 def test_lips_that_gape_where_truth_touches_are_counted(face):
     _, regions = face
     model = sheet_face(gap_mm=0.0)

@@ -160,6 +160,30 @@ def gaps_in_head(
     return lip_gaps(np.matmul(points_mm, head_rotations.transpose(0, 2, 1)), sides, columns)
 
 
+def sums_of_moving_errors(
+    sequence_mm: np.ndarray,
+    reference: Reference,
+    head_rotations: np.ndarray,
+    regions: Regions,
+    clips: np.ndarray,
+) -> ClipSums:
+    """Sums behind `moving_error_mm`: what is left without each vertex's mean offset, head frame.
+
+    The mean offset is what is wrong about the person or the size; the rest, about the motion.
+
+    Args:
+        sequence_mm: (F, V, 3) aligned to the reference.
+        head_rotations: (F, 3, 3) from the reference's world to the head frame.
+    """
+    offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
+    moving = np.linalg.norm(offset - offset.mean(axis=0), axis=2)
+    sums = {}
+    for region, weights in regions.weights.items():
+        weight, error = weighted_sums(moving, weights, clips)
+        sums[f"{region}.moving_weight"], sums[f"{region}.moving"] = weight, error
+    return ClipSums(sums)
+
+
 def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
     """Sums of one figure a frame, (F,); NaN frames do not count."""
     known = np.isfinite(values)

@@ -19,6 +19,7 @@ COLUMNS = (
 #: measure, numerator, denominator, unit: the ratio of two sums.
 _RATIOS = (
     ("vertex_error_mean_mm", "error", "weight", "mm"),
+    ("moving_error_mm", "moving", "moving_weight", "mm"),
     ("jitter_mm", "jitter", "jitter_weight", "mm"),
     ("drift_mm", "drift", "drift_weight", "mm"),
     ("aperture_error_mm", "aperture", "aperture_frames", "mm"),
