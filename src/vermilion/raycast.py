@@ -88,6 +88,10 @@ class RayCaster:
 
 def interpolate(hits: Hits, triangles: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Per-vertex `values` (V, ...) at the hits, (..., ...); zero where nothing is hit."""
-    corners = values[triangles[np.maximum(hits.triangle, 0)]]
-    weights = hits.barycentric.reshape(*hits.barycentric.shape, *([1] * (values.ndim - 1)))
-    return (corners * weights).sum(axis=hits.triangle.ndim)
+    hit = hits.triangle >= 0
+    weights = hits.barycentric[hit]
+    corners = values[triangles[hits.triangle[hit]]]
+    found = (corners * weights.reshape(*weights.shape, *([1] * (values.ndim - 1)))).sum(axis=1)
+    result = np.zeros((*hits.triangle.shape, *values.shape[1:]), dtype=found.dtype)
+    result[hit] = found
+    return result
