@@ -20,6 +20,7 @@ include: "workflow/rules/scan.smk"
 include: "workflow/rules/tracking.smk"
 include: "workflow/rules/refinement.smk"
 include: "workflow/rules/detail.smk"
+include: "workflow/rules/shading.smk"
 include: "workflow/rules/contours.smk"
 include: "workflow/rules/correspondence.smk"
 include: "workflow/rules/features.smk"
@@ -54,9 +55,10 @@ rule database_only:
 
 
 rule detail:
-    """The finer sequences of `detail.takes` (Mono13 section 7)."""
+    """The finer sequences of `detail.takes` and `detail.shading.takes` (Mono13 sections 7, 8)."""
     input:
         detail_outputs(),
+        shading_outputs(),
 
 
 rule regressors:

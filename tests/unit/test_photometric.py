@@ -207,3 +207,14 @@ def test_ablations_tell_frames_that_taught_the_appearance_from_others():
     assert list(rows["residual"]) == [2.0, 1.5]
     assert list(rows["held_out"]) == [3.0, 2.0]
     assert list(rows["frames"]) == [2, 3]
+
+
+def test_ablations_say_which_residuals_compare():
+    steps = ["photometric", "before_flow", "flow", "before_shading", "shading"]
+    table = pd.DataFrame(
+        {"subject": "s", "take": "t", "step": steps, "frame": 0, "residual": [2.0, 4, 3, 5, 4]}
+    )
+    bases = ablation_rows(table).set_index("step")["basis"]
+    assert bases["before_flow"] == bases["flow"]
+    assert bases["before_shading"] == bases["shading"]
+    assert len(set(bases)) == 3

@@ -135,6 +135,24 @@ def test_refinement_switched_off(finished):
     assert not jobs & {"appearance", "photometric", "photometric_join", "residuals", "ablations"}
 
 
+def test_relief_of_a_take(finished):
+    def change(content):
+        content["detail"] = {"shading": {"takes": [TAKE]}}
+
+    added = {"shading_light", "shading_relief", "shading_meshes"}
+    with configured(finished, change):
+        assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
+
+
+def test_relief_after_the_corrective_flow(finished):
+    def change(content):
+        content["detail"] = {"takes": [TAKE], "shading": {"takes": [TAKE]}}
+
+    added = {"detail_flow", "shading_light", "shading_relief", "shading_meshes"}
+    with configured(finished, change):
+        assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
+
+
 def test_line_of_code_in_the_tracking_module(finished):
     path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):

@@ -29,8 +29,8 @@ def take_source(wildcards):
 
 
 def ablation_tables(wildcards=None):
-    """Residuals of every step, chunk and take that is used."""
-    return [
+    """Residuals of every step, chunk and take that is used, and of the finer sequences."""
+    return detail_residuals() + [
         path
         for take in used_takes(("tattoo", "video"))
         for step in refinement_steps()

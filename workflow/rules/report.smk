@@ -42,6 +42,8 @@ def quality_files():
     for take in detail_takes():
         pattern = R + "/takes/{subject}/{take}/detail/quality/{chunk}.tsv"
         paths += expand_chunks(pattern, take.subject, take.take)
+    for take in shading_takes():
+        paths += expand_chunks(SHADING + "/quality/{chunk}.tsv", take.subject, take.take)
     for name in applied_takes():
         paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))
     return paths
@@ -65,6 +67,10 @@ def stage_overlays():
     for take in detail_takes():
         pattern = R + "/takes/{subject}/{take}/detail/overlay/{chunk}.png"
         rows.append(["detail", take.name, expand_chunks(pattern, take.subject, take.take)[0]])
+    for take in shading_takes():
+        pattern = SHADING + "/overlay/{chunk}.png"
+        path = expand_chunks(pattern, take.subject, take.take)[0]
+        rows.append(["detail", f"{take.name}, relief", path])
     for take in used_takes(("tattoo", "plain")):
         path = f"{R}/takes/{take.name}/multiview/overlay/neutral.png"
         rows.append(["multiview", f"{take.name}, neutral", path])

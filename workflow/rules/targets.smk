@@ -86,6 +86,7 @@ def all_outputs():
         *clip_outputs(),
         *subject_outputs(),
         *detail_outputs(),
+        *shading_outputs(),
         R + "/database/lips.h5",
         *regressor_outputs(),
         *evaluation_outputs(),
@@ -101,7 +102,7 @@ def all_outputs():
             for name in applied_takes()
             if CONFIG.apply.makeup.enabled
         ],
-        *([R + "/evaluation/ablations.tsv"] if refinement_steps() else []),
+        *([R + "/evaluation/ablations.tsv"] if ablation_tables() else []),
         R + "/quality.tsv",
         R + "/evaluation/summary.html",
     ]

@@ -1,8 +1,8 @@
-"""Configuration of the finer sequence: dense correction of the coarse meshes (Mono13 7)."""
+"""Configuration of the finer sequence: dense correction of the coarse meshes (Mono13 7), relief (8)."""
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from vermilion.config.base import StageConfig
 
@@ -65,6 +65,75 @@ class DeformationConfig(StageConfig):
     )
 
 
+class ShadingConfig(StageConfig):
+    """Fine relief from shading (Mono13 8), after the corrective flow where a take has it."""
+
+    takes: list[str] = Field(
+        default_factory=list,
+        description="Takes (subject/take) of role video or tattoo that get relief; none by default.",
+    )
+    levels: int = Field(
+        1,
+        ge=0,
+        le=3,
+        description="Subdivisions of the coarse mesh (count); each one costs fourfold.",
+    )
+    light_frames: int = Field(
+        10, ge=2, le=200, description="First frames that tell light, albedo and noise (count)."
+    )
+    face_px: int = Field(
+        640,
+        ge=64,
+        le=4096,
+        description="A larger face is reduced to this (longer side, pixels).",
+    )
+    detail_mm: float = Field(
+        8.0,
+        gt=0,
+        le=1000,
+        description="Shading that changes over longer ranges is left to light and mesh (mm).",
+    )
+    curvature_sigma: float = Field(
+        0.03, gt=0, le=10, description="Typical curvature of the relief; less is smoother (1 / mm)."
+    )
+    displacement_sigma_mm: float = Field(
+        0.3, gt=0, le=100, description="Typical height of the relief (mm)."
+    )
+    noise_floor: float = Field(
+        1.0,
+        gt=0,
+        le=255,
+        description="Least noise of a value, where the first frames show less (display values).",
+    )
+    misplaced_mm: float = Field(
+        0.5,
+        ge=0,
+        le=100,
+        description="Typical error of a place on the skin: edges of paint are trusted less (mm).",
+    )
+    iterations: int = Field(2, ge=1, le=50, description="Gauss-Newton steps (count).")
+    window: int = Field(
+        5, ge=1, le=99, description="Frames over which normals are averaged, odd (count)."
+    )
+    position_weight: float = Field(
+        0.1,
+        gt=0,
+        le=100,
+        description="Trust in positions against normals, where both are brought together (1 / mm).",
+    )
+    map_px: int = Field(1024, ge=16, le=8192, description="Side of the normal maps (pixels).")
+    overlay_frames: int = Field(
+        2, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+    )
+
+    @field_validator("window")
+    @classmethod
+    def _odd(cls, window: int) -> int:
+        if window % 2 == 0:
+            raise ValueError("an odd number, so that the window has a middle")
+        return window
+
+
 class DetailConfig(StageConfig):
     """The finer sequence, in `detail/` of a take."""
 
@@ -83,6 +152,9 @@ class DetailConfig(StageConfig):
     )
     deformation: DeformationConfig = Field(
         default_factory=DeformationConfig, description="The mesh after the flow (Mono13 7.2)."
+    )
+    shading: ShadingConfig = Field(
+        default_factory=ShadingConfig, description="Fine relief from shading (Mono13 8)."
     )
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."

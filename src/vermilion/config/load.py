@@ -126,12 +126,17 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"{origin}, key apply.takes: found '{name}' of role {by_name[name].role}; expected "
                 "role video or tattoo. Only these have the features that a regressor needs."
             )
-    for name in configuration.detail.takes:
-        if name not in by_name or by_name[name].role not in ("video", "tattoo"):
-            problems.append(
-                f"{origin}, key detail.takes: found '{name}'; expected a take of the sheet of role "
-                "video or tattoo, written subject/take."
-            )
+    refined = {
+        "takes": configuration.detail.takes,
+        "shading.takes": configuration.detail.shading.takes,
+    }
+    for key, names in refined.items():
+        for name in names:
+            if name not in by_name or by_name[name].role not in ("video", "tattoo"):
+                problems.append(
+                    f"{origin}, key detail.{key}: found '{name}'; expected a take of the sheet of "
+                    "role video or tattoo, written subject/take."
+                )
     for name in configuration.landmarks.training_takes:
         if name not in by_name:
             problems.append(

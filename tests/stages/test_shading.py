@@ -1,0 +1,132 @@
+"""Relief from pictures and smooth meshes: found, averaged, and the same for any chunks."""
+
+import numpy as np
+import pytest
+
+from tests.stages.run_script import run_script
+from tests.stages.test_detail import CAMERA, MODEL
+from vermilion.config.detail import DetailConfig
+from vermilion.images import read_channels, read_image, write_image
+from vermilion.mesh import vertex_normals
+from vermilion.photometric.harmonics import irradiance
+from vermilion.raycast import RayCaster, interpolate
+from vermilion.sequences import read_mesh, read_sequence, write_sequence
+from vermilion.tables import read_table
+from vermilion.tracking.expression import HeadMotion
+from vermilion.tracking.result import TrackedTake
+
+N_FRAMES = 6
+
+
+def with_wrinkle(frame):
+    """The sheet, on which a wrinkle comes up from frame 2 on."""
+    points = MODEL.neutral_mm.astype(float)
+    wrinkle = 0.25 * max(frame - 1, 0) * np.exp(-((points[:, 0] - 8) ** 2) / (2 * 4.0**2))
+    wrinkle *= np.abs(points[:, 1]) < 30
+    return points + wrinkle[:, None] * vertex_normals(points, MODEL.triangles)
+
+
+def render(vertices):
+    hits = RayCaster(vertices, MODEL.triangles).see(CAMERA)
+    normals = interpolate(hits, MODEL.triangles, vertex_normals(vertices, MODEL.triangles))
+    light = np.zeros((9, 3))
+    light[0], light[2], light[3] = 0.8, -0.4, 0.6
+    shaded = 0.35 * irradiance(normals @ CAMERA.rotation.T, light)
+    return np.where(hits.hit[..., None], shaded, 0.1)
+
+
+def prepare(root, sizes, missing=()):
+    MODEL.save(root / "tracker.npz")
+    motion = HeadMotion(
+        np.repeat(np.eye(3)[None], N_FRAMES, axis=0),
+        np.zeros((N_FRAMES, 3)),
+        np.zeros((N_FRAMES, 1)),
+        np.zeros(N_FRAMES),
+    )
+    valid = np.ones(N_FRAMES, dtype=bool)
+    TrackedTake.of(np.arange(N_FRAMES), motion, valid, CAMERA, MODEL).save(root / "fit.npz")
+    for frame in range(N_FRAMES):
+        if frame not in missing:
+            write_image(root / "frames" / "cam" / f"{frame:06d}.png", render(with_wrinkle(frame)))
+    paths = []
+    for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
+        paths.append(root / "C" / f"{first:06d}-{first + size - 1:06d}.npy")
+        write_sequence(paths[-1], np.repeat(MODEL.neutral_mm[None], size, axis=0))
+    return paths
+
+
+def run_stage(root, paths):
+    shading = DetailConfig(
+        shading={"levels": 0, "light_frames": 2, "map_px": 32, "noise_floor": 0.5}
+    ).shading.model_dump(mode="json")
+    params = {
+        "cfg": {f"detail.shading.{key}": value for key, value in shading.items()},
+        "source": str(root), "span": [0, N_FRAMES - 1],
+    }  # fmt: skip
+    files = {"tracker": root / "tracker.npz", "fit": root / "fit.npz", "meshes": paths}
+    out = root / "shading"
+    files["light"] = out / "light.npz"
+    place = {"subject": "s", "take": "t"}
+    made = {"light": files["light"], "topology": out / "topology.obj"}
+    run_script("shading_light", wildcards=place, params=params, input=files, output=made)
+    reliefs = [out / "relief" / f"{path.stem}.npz" for path in paths]
+    for relief in reliefs:
+        first, last = (int(n) for n in relief.stem.split("-"))
+        params["frames"] = list(range(first, last + 1))
+        made = {"relief": relief}
+        run_script("shading_relief", wildcards=place, params=params, input=files, output=made)
+    for path in paths:
+        first, last = (int(n) for n in path.stem.split("-"))
+        params["frames"] = list(range(first, last + 1))
+        made = {
+            "meshes": out / path.name,
+            "maps": out / "normals" / path.stem,
+            "quality": out / f"quality{path.stem}.tsv",
+            "overlay": out / f"overlay{path.stem}.png",
+            "start": out / f"before{path.stem}.tsv",
+            "after": out / f"after{path.stem}.tsv",
+        }
+        inputs = {**files, "reliefs": reliefs}
+        run_script("shading_meshes", wildcards=place, params=params, input=inputs, output=made)
+    return read_sequence([out / path.name for path in paths])
+
+
+def test_wrinkle_is_found_whatever_the_chunks(tmp_path):
+    paths = prepare(tmp_path / "one", [N_FRAMES])
+    whole = run_stage(tmp_path / "one", paths)
+    parts = run_stage(tmp_path / "two", prepare(tmp_path / "two", [3, N_FRAMES - 3]))
+    assert (parts == whole).all()
+
+    true = vertex_normals(with_wrinkle(5), MODEL.triangles)
+    smooth = vertex_normals(MODEL.neutral_mm.astype(float), MODEL.triangles)
+    found = vertex_normals(whole[5].astype(float), MODEL.triangles)
+    places = MODEL.neutral_mm
+    near = (np.abs(places[:, 0] - 8) < 10) & (np.abs(places[:, 1]) < 20)
+
+    def error_deg(normals):
+        return np.degrees(np.arccos(np.clip((normals * true).sum(axis=1), -1, 1)))[near].mean()
+
+    assert error_deg(found) < 0.7 * error_deg(smooth)
+    out, name = tmp_path / "one" / "shading", f"000000-{N_FRAMES - 1:06d}"
+    before = read_table(out / f"before{name}.tsv", ["frame", "residual"])
+    after = read_table(out / f"after{name}.tsv", ["frame", "residual"])
+    assert (after["residual"][3:] < before["residual"][3:]).all()
+    assert list(after["learnt_from"]) == [1, 1, 0, 0, 0, 0]
+    assert read_image(out / f"overlay{name}.png").std() > 0
+    assert len(read_mesh(out / "topology.obj").vertices_mm) == whole.shape[1]
+    maps = [read_channels(out / "normals" / name / f"{f:06d}.exr") for f in (0, 5)]
+    assert np.abs(maps[0]["R"] - 0.5).max() < 0.3 * np.abs(maps[1]["R"] - 0.5).max()
+
+
+def test_frame_without_picture_is_flagged(tmp_path):
+    paths = prepare(tmp_path, [N_FRAMES], missing=(3,))
+    found = run_stage(tmp_path, paths)
+    assert np.isfinite(found).all()
+    rows = read_table(tmp_path / "shading" / f"quality{paths[0].stem}.tsv").set_index("frame")
+    assert rows.loc[3, "valid"] == 0 and "no relief" in rows.loc[3, "reason"]
+    assert rows["valid"].sum() == N_FRAMES - 1
+
+
+def test_even_window_is_refused():
+    with pytest.raises(ValueError, match="odd"):
+        DetailConfig(shading={"window": 4})
