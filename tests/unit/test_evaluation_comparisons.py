@@ -123,6 +123,20 @@ def test_sentences_say_what_the_figures_say():
     assert "not shown to differ" in sentence(level.to_dict())
 
 
+def test_sentences_tell_the_motion_from_the_person():
+    """Twice the error, all of it in the person: the motion is as good."""
+    errors = np.linspace(1.0, 2.0, CLIPS)
+    moving = {"mouth.moving": errors, "mouth.moving_weight": np.ones(CLIPS)}
+    take = {
+        name: ClipSums({**sums(total).sums, **moving})
+        for name, total in (("MS/rbf", 2 * errors), ("MS/affine", errors))
+    }
+    rows = comparisons([(take, 100)], questions_of("kernel"), 200, 0.95, 0)
+    (_, sentences), *_ = statements(rows, estimators(CURVES, TABLE1, "kernel"), TABLE1, "kernel")
+    assert "100 % more" in sentences[0]
+    assert "Of the motion alone: 1.50 mm, 1.50 mm, 0 % less (level)." in sentences[0]
+
+
 def test_where_an_advantage_is_missing_the_other_figures_are_told():
     layers = np.full(CLIPS, 0.1)
     take = {

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-_TRACKING, _LAYERS = "vertex_error_mean_mm", "feature_error"
+_TRACKING, _MOVING, _LAYERS = "vertex_error_mean_mm", "moving_error_mm", "feature_error"
+_WORDS = {"better": "better", "worse": "worse", "level": "level", "unknown": "without interval"}
 
 
 def statements(
@@ -20,7 +21,10 @@ def statements(
     found = []
     for question, rows in comparisons.groupby("question", sort=False):
         tracking = rows[rows["measure"] == _TRACKING]
-        sentences = [sentence(row) for row in tracking.to_dict("records")]
+        sentences = [
+            sentence(row) + of_motion(row, rows[rows["measure"] == _MOVING])
+            for row in tracking.to_dict("records")
+        ]
         sentences += [
             reason
             for row in tracking.to_dict("records")
@@ -52,6 +56,19 @@ def sentence(row: dict) -> str:
     return f"{figures} ({interval}): {verdict}."
 
 
+def of_motion(row: dict, moving: pd.DataFrame) -> str:
+    """The same comparison without what is wrong about the person in all frames alike; may be empty."""
+    same = moving[(moving["first"] == row["first"]) & (moving["second"] == row["second"])]
+    if same.empty:
+        return ""
+    found = same.iloc[0]
+    change = 100 * (1 - found["ratio"])
+    return (
+        f" Of the motion alone: {found['first_value']:.2f} mm, {found['second_value']:.2f} mm, "
+        f"{abs(change):.0f} % {'less' if change >= 0 else 'more'} ({_WORDS[found['answer']]})."
+    )
+
+
 def why(
     row: dict,
     comparisons: pd.DataFrame,
@@ -74,15 +91,9 @@ def why(
     ]
     if len(layers):
         change = 100 * (1 - float(layers["ratio"].iloc[0]))
-        word = {
-            "better": "better",
-            "worse": "worse",
-            "level": "level",
-            "unknown": "without interval",
-        }
         parts.append(
             f"in the layers themselves its error on held-out frames is {abs(change):.0f} % "
-            f"{'less' if change >= 0 else 'more'} ({word[layers['answer'].iloc[0]]})"
+            f"{'less' if change >= 0 else 'more'} ({_WORDS[layers['answer'].iloc[0]]})"
         )
     pair = estimators[estimators["regressor"] == kind].set_index("estimator")["feature_error"]
     of_kind = [row[side].partition("/") for side in ("first", "second")]

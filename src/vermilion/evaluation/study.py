@@ -23,7 +23,8 @@ def answers(
     if not found:
         return _LACKING
     note = (
-        "<p>Mean vertex error over the mouth mask of held-out frames. Both sides are measured on the same "
+        "<p>Mean vertex error over the mouth mask of held-out frames, and of the motion alone: without each "
+        "vertex's mean offset over a take, which is of the person and the size. Both sides are measured on the same "
         "clips, and the interval is that of their difference. The figures are in "
         "<code>comparisons.tsv</code>.</p>"
     )
