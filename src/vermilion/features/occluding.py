@@ -19,6 +19,8 @@ from vermilion.mesh_points import MeshPoints
 _PER_EDGE = 4
 #: Columns of the mouth in each of which the contour is one point.
 _COLUMNS = 40
+#: More than any picture is high (px): columns are sorted by height together, one after the other.
+_APART = 1e6
 
 
 @dataclass(frozen=True)
@@ -75,11 +77,12 @@ class OccludingContour:
         column = np.floor(np.where(np.isfinite(place), place, -1e6)).astype(int)
         wanted = np.floor((inner_px - outer_px[0]) @ along / column_px)
         wanted = np.where(np.isfinite(wanted), wanted, -2e6).astype(int)
+        height = pixels @ up
         samples, points = [], []
         upper, lower = np.arange(1, half), np.arange(half + 1, 2 * half)
         for side, of_side, sign in ((1, upper, 1.0), (2, lower, -1.0)):
             ids = np.flatnonzero(self.sides == side)
-            order = ids[np.lexsort((sign * (pixels[ids] @ up), column[ids]))]
+            order = ids[np.argsort(_APART * column[ids] + sign * height[ids], kind="stable")]
             columns, first = np.unique(column[order], return_index=True)
             if not len(columns):
                 continue
