@@ -71,25 +71,31 @@ def render(vertices):
     return np.where(hits.hit[..., None], colours, 0.1)
 
 
-def prepare(root, sizes, missing=()):
-    true, coarse = true_and_coarse()
+def write_take(root, sizes, coarse, picture_of, missing=()):
+    """Tracker, fit, pictures (`picture_of` a frame) and coarse meshes (F, V, 3) in chunks of `sizes`."""
+    n_frames = len(coarse)
     MODEL.save(root / "tracker.npz")
     motion = HeadMotion(
-        np.repeat(np.eye(3)[None], N_FRAMES, axis=0),
-        np.zeros((N_FRAMES, 3)),
-        np.zeros((N_FRAMES, 1)),
-        np.zeros(N_FRAMES),
+        np.repeat(np.eye(3)[None], n_frames, axis=0),
+        np.zeros((n_frames, 3)),
+        np.zeros((n_frames, 1)),
+        np.zeros(n_frames),
     )
-    valid = np.ones(N_FRAMES, dtype=bool)
-    TrackedTake.of(np.arange(N_FRAMES), motion, valid, CAMERA, MODEL).save(root / "fit.npz")
-    for frame in range(N_FRAMES):
+    valid = np.ones(n_frames, dtype=bool)
+    TrackedTake.of(np.arange(n_frames), motion, valid, CAMERA, MODEL).save(root / "fit.npz")
+    for frame in range(n_frames):
         if frame not in missing:
-            write_image(root / "frames" / "cam" / f"{frame:06d}.png", render(true[frame]))
+            write_image(root / "frames" / "cam" / f"{frame:06d}.png", picture_of(frame))
     paths = []
     for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
         paths.append(root / "C" / f"{first:06d}-{first + size - 1:06d}.npy")
         write_sequence(paths[-1], coarse[first : first + size])
-    return true, coarse, paths
+    return paths
+
+
+def prepare(root, sizes, missing=()):
+    true, coarse = true_and_coarse()
+    return true, coarse, write_take(root, sizes, coarse, lambda f: render(true[f]), missing)
 
 
 def run_stage(root, paths):

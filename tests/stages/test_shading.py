@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 
 from tests.stages.run_script import run_script
-from tests.stages.test_detail import CAMERA, MODEL
+from tests.stages.test_detail import CAMERA, MODEL, write_take
 from vermilion.config.detail import DetailConfig
-from vermilion.images import read_channels, read_image, write_image
+from vermilion.images import read_channels, read_image
 from vermilion.mesh import vertex_normals
 from vermilion.photometric.harmonics import irradiance
 from vermilion.raycast import RayCaster, interpolate
-from vermilion.sequences import read_mesh, read_sequence, write_sequence
+from vermilion.sequences import read_mesh, read_sequence
 from vermilion.tables import read_table
-from vermilion.tracking.expression import HeadMotion
-from vermilion.tracking.result import TrackedTake
 
 N_FRAMES = 6
 
@@ -36,23 +34,8 @@ def render(vertices):
 
 
 def prepare(root, sizes, missing=()):
-    MODEL.save(root / "tracker.npz")
-    motion = HeadMotion(
-        np.repeat(np.eye(3)[None], N_FRAMES, axis=0),
-        np.zeros((N_FRAMES, 3)),
-        np.zeros((N_FRAMES, 1)),
-        np.zeros(N_FRAMES),
-    )
-    valid = np.ones(N_FRAMES, dtype=bool)
-    TrackedTake.of(np.arange(N_FRAMES), motion, valid, CAMERA, MODEL).save(root / "fit.npz")
-    for frame in range(N_FRAMES):
-        if frame not in missing:
-            write_image(root / "frames" / "cam" / f"{frame:06d}.png", render(with_wrinkle(frame)))
-    paths = []
-    for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
-        paths.append(root / "C" / f"{first:06d}-{first + size - 1:06d}.npy")
-        write_sequence(paths[-1], np.repeat(MODEL.neutral_mm[None], size, axis=0))
-    return paths
+    coarse = np.repeat(MODEL.neutral_mm[None], N_FRAMES, axis=0)
+    return write_take(root, sizes, coarse, lambda f: render(with_wrinkle(f)), missing)
 
 
 def run_stage(root, paths):

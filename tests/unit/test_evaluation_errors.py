@@ -94,6 +94,9 @@ def test_a_wrong_person_that_moves_rightly_has_no_moving_error(face):
     share = lower / regions.weights["vermilion"].sum()
     expected = share * np.abs(opening - opening.mean()).mean()
     assert value["moving_error_mm", "vermilion", "still"] == pytest.approx(expected, rel=0.05)
+    other[2] = np.nan  # one lost frame does not take the others along
+    _, value = evaluate(model, regions, {"base": other}, truth)
+    assert value["moving_error_mm", "vermilion", "base"] < 1e-6
 
 
 def test_lips_that_gape_where_truth_touches_are_counted(face):

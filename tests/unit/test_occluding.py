@@ -5,7 +5,7 @@ import pytest
 
 from tests.heads import small_tracker
 from vermilion.camera import look_at, pinhole
-from vermilion.faces.lips import lip_sides
+from vermilion.faces.lips import lips_with_inside
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 
@@ -35,7 +35,7 @@ def opened(model):
 
 def test_no_point_of_a_lip_hangs_over_the_contour(model):
     vertices = opened(model)
-    sides = lip_sides(model)
+    sides = lips_with_inside(model)
     _, side, points = seen(model, vertices)
     assert len(points) > 50
     for lip, sign in ((1, 1.0), (2, -1.0)):

@@ -38,11 +38,20 @@ def detail_residuals():
     ]
 
 
+def mesh_before_shading(wildcards):
+    """Pattern of the chunks of the sequence that the relief is added to."""
+    folder = "/detail/flow" if take_of(wildcards) in detail_takes() else "/tracking/C"
+    return f"{R}/takes/{wildcards.subject}/{wildcards.take}{folder}/{{chunk}}.npy"
+
+
 def meshes_before_shading(wildcards):
-    """All chunks of the sequence that the relief is added to."""
-    flow = take_of(wildcards) in detail_takes()
-    folder = "/detail/flow" if flow else "/tracking/C"
-    return per_chunk(R + "/takes/{subject}/{take}" + folder + "/{chunk}.npy")(wildcards)
+    """All chunks of that sequence."""
+    return expand_chunks(mesh_before_shading(wildcards), wildcards.subject, wildcards.take)
+
+
+def chunk_before_shading(wildcards):
+    """The wildcards' chunk of that sequence, as a list of one."""
+    return [mesh_before_shading(wildcards).format(chunk=wildcards.chunk)]
 
 
 def near_reliefs(wildcards):
@@ -98,7 +107,7 @@ rule shading_relief:
         unpack(take_pictures),
         tracker=tracker_of,
         fit=TRACKING + "/fit.npz",
-        meshes=meshes_before_shading,
+        meshes=chunk_before_shading,
         light=SHADING + "/light.npz",
     output:
         relief=SHADING + "/relief/{chunk}.npz",
@@ -133,7 +142,7 @@ rule shading_meshes:
         unpack(take_pictures),
         tracker=tracker_of,
         fit=TRACKING + "/fit.npz",
-        meshes=meshes_before_shading,
+        meshes=chunk_before_shading,
         light=SHADING + "/light.npz",
         reliefs=near_reliefs,
     output:

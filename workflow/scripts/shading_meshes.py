@@ -31,7 +31,8 @@ def main(snakemake):
     model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
     topology = FineTopology.of(model, cfg["detail.shading.levels"])
     first, last = params.span
-    scene = Scene.open(topology, inputs, params.source, place, (first, last), cfg)
+    own = params.frames[0], params.frames[-1]
+    scene = Scene.open(topology, inputs, params.source, place, own, cfg)
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.shading.map_px"])
     window, weight = cfg["detail.shading.window"], cfg["detail.shading.position_weight"]

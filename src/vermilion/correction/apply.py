@@ -8,7 +8,8 @@
 **C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
 `neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`): it sets the weights
 of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are
-those of the take. With `smooth_frames` what is regressed is made coherent over time (`coherence`). For known layers and displacements (the oracle):
+those of the take. With `smooth_frames` what is regressed is made coherent over time (`coherence`).
+For known layers and displacements (the oracle):
 
     corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
                                     translation_mm, valid=valid, seam_mm=16.0,

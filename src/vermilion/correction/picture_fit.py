@@ -136,7 +136,7 @@ class PictureFit:
             moves = self._solver.near_moves(rows, self._solver.multipliers(rows), self._lips)
             now[self._lips] += moves
             rows = rows_of(self._seen(now, *place, picture, f))
-        if weight == 0:
+        else:
             rows = rows[:0]
         if not self.settings.contact:
             return rows, self._solver.multipliers(rows)

@@ -176,7 +176,9 @@ def sums_of_moving_errors(
         head_rotations: (F, 3, 3) from the reference's world to the head frame.
     """
     offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
-    moving = np.linalg.norm(offset - offset.mean(axis=0), axis=2)
+    known = np.isfinite(offset)
+    mean = np.where(known, offset, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    moving = np.linalg.norm(offset - mean, axis=2)
     sums = {}
     for region, weights in regions.weights.items():
         weight, error = weighted_sums(moving, weights, clips)

@@ -56,8 +56,9 @@ percentile is weighted by the area of the neutral.</p>
 <p><b>Measures.</b> Vertex error: distance to the corresponding point. Surface error: distance to the
 nearest point of the true surface. Gap: lowest point of the upper lip less highest point of the lower, in
 seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
-time, less that of the truth. Contour error: distance of contour points found in the picture to the
-projected contours of the mesh, per inter-ocular distance. Lip penetration: share of frames in which one
+time, less that of the truth. Moving error: vertex error without each vertex's mean offset over the take's frames in the
+head frame. Contour error: distance of contour points found in the picture to the outer contour of the mesh and to
+what of its lips hides the mouth there, per inter-ocular distance. Lip penetration: share of frames in which one
 lip lies deeper in the other than <code>evaluation.measures.through_mm</code>. Feature error: RMS of
 regressed against true layer entries.</p>
 <p><b>Kinds of mouth shapes.</b> By the true expression weights where they are known, each over a threshold

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.faces.lips import lip_labels, lip_sides
+from vermilion.faces.lips import lip_labels, lips_with_inside
 from vermilion.faces.model import FaceModel
 
 N_COLUMNS = 7
@@ -33,7 +33,7 @@ def columns_of(model: FaceModel) -> np.ndarray:
 
     The columns stand side by side from the subject's right to their left, in the neutral.
     """
-    sides = lip_sides(model)
+    sides = lips_with_inside(model)
     x = model.neutral_mm[:, 0]
     vermilion = lip_labels(model) > 0
     low, high = x[vermilion].min(), x[vermilion].max()
@@ -49,7 +49,7 @@ def lip_gaps(points_mm: np.ndarray, sides: np.ndarray, columns: np.ndarray) -> n
 
     Args:
         points_mm: (F, V, 3) in the head frame (y up); NaN points do not count.
-        sides, columns: (V,) of `lip_sides`, `columns_of`.
+        sides, columns: (V,) of `lips_with_inside`, `columns_of`.
     """
     gaps = np.full((len(points_mm), N_COLUMNS), np.nan)
     height = points_mm[..., 1]

@@ -33,7 +33,7 @@ from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
-from vermilion.faces.lips import lip_sides
+from vermilion.faces.lips import lips_with_inside
 from vermilion.faces.model import FaceModel
 from vermilion.progress import progress
 
@@ -102,7 +102,7 @@ def evaluate_take(
         posed = moved(reference.points_mm, head_rotations, head_translations)
         kinds = kinds_of_shapes(posed, rest, model, reference.valid)
     clips = clips_of(frames, clip_frames, min_clips)
-    sides, columns = lip_sides(model), columns_of(model)
+    sides, columns = lips_with_inside(model), columns_of(model)
     true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
     surface = surface_errors(
         aligned, reference, regions.used, lambda items: progress(items, "surface errors")

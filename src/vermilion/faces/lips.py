@@ -18,7 +18,7 @@ def lip_labels(model: FaceModel) -> np.ndarray:
     return labels
 
 
-def lip_sides(model: FaceModel) -> np.ndarray:
+def lips_with_inside(model: FaceModel) -> np.ndarray:
     """(V,) int8: 1 upper lip, 2 lower, 0 neither; the vermilion and a little of the lips' inside."""
     labels = lip_labels(model)
     neighbours = adjacency(model.triangles, model.n_vertices)

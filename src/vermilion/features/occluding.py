@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.faces.lips import lip_sides
+from vermilion.faces.lips import lips_with_inside
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import unique_edges
 from vermilion.mesh_points import MeshPoints
@@ -41,7 +41,7 @@ class OccludingContour:
 
         Extremes of a triangle lie on its edges.
         """
-        sides = lip_sides(model)
+        sides = lips_with_inside(model)
         of_corner = sides[model.triangles]
         whole = (of_corner == of_corner[:, :1]).all(axis=1) & (of_corner[:, 0] > 0)
         start, end = unique_edges(model.triangles[whole]).T

@@ -21,6 +21,9 @@ import numpy as np
 from vermilion.contours.paths import cheapest_ring
 from vermilion.features.arch import arch_depth
 
+#: What the fourth power counts beside the square in the cost of an inner contour far from the model's.
+_STEEP = 8.0
+
 
 @dataclass(frozen=True)
 class SearchSettings:
@@ -183,7 +186,7 @@ def _distance_cost(reaches: np.ndarray) -> np.ndarray:
 
     Where teeth touch a lip its ridge is weak, and that of the other lip must not stand in for it.
     """
-    return reaches**2 + 8.0 * reaches**4
+    return reaches**2 + _STEEP * reaches**4
 
 
 def _smoothness(ring: np.ndarray, unit: float, settings: SearchSettings) -> np.ndarray:

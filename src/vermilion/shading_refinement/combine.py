@@ -22,9 +22,9 @@ def combine(
     """Displacements (S,) mm along the normals `smooth` (S, 3) that give the skin the normals `wanted`.
 
     Nehab et al. 2005, eq. 7: edges at right angles to the normals, positions near the found ones
-    `along_mm` (S,) by `position_weight` (1 / mm). Here positions move along the normal only; and as chords of a
-    curved surface are not at right angles to its normals, an edge keeps the angle that it has in the
-    smooth mesh: unchanged normals change nothing. The skin's border stays.
+    `along_mm` (S,) by `position_weight` (1 / mm). Here positions move along the normal only; and as
+    chords of a curved surface are not at right angles to its normals, an edge keeps the angle that it
+    has in the smooth mesh: unchanged normals change nothing. The skin's border stays.
     """
     n = len(skin_mm)
     i, j = topology.edges.T
