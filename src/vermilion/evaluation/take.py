@@ -196,7 +196,8 @@ def _frame_rows(
         weights = regions.weights[region]
         value = np.full(len(frames), np.nan)
         if errors_mm is not None and weights.sum() > 0:
-            value = np.nan_to_num(errors_mm) @ weights / (np.isfinite(errors_mm) @ weights)
+            known = np.isfinite(errors_mm) @ weights
+            np.divide(np.nan_to_num(errors_mm) @ weights, known, out=value, where=known > 0)
         columns[f"{region}_mm"] = value
     columns["aperture_mm"] = aperture_mm(gaps)
     return pd.DataFrame(columns)
