@@ -113,7 +113,7 @@ if CONFIG.refinement.photometric:
             mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
             runtime=60,
         params:
-            cfg=cfg_of("tracking.fit", "tracking.motion"),
+            cfg=cfg_of("tracking.fit", "tracking.motion", "refinement.join"),
             code=code_of("photometric_join"),
             fps=lambda wildcards: take_of(wildcards).fps,
         script:

@@ -1,5 +1,7 @@
 """The refined frames of a take, smooth over time, as the track that all later stages use."""
 
+from dataclasses import replace
+
 from vermilion.chunks import read_chunks
 from vermilion.logfile import log_to
 from vermilion.photometric.join import join_frames
@@ -11,10 +13,11 @@ def main(snakemake):
     fit, _, start = TakeStart.load(inputs, cfg)
     names = ["x", "matrix", "right", "refined"]
     found = read_chunks(inputs.chunks, fit.frames, names)
+    # Pictures tell the weights with more noise than landmarks do: so they are smoothed more.
+    smooth = replace(start.settings, **cfg["refinement.join"])
     x = join_frames(
-        found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps,
-        start.settings,
-    )  # fmt: skip
+        found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth
+    )
     start.with_motion(fit, x).save(snakemake.output.fit)
 
 

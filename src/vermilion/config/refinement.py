@@ -67,6 +67,18 @@ class PhotometricConfig(StageConfig):
     )
 
 
+class JoinConfig(StageConfig):
+    """The refined frames of a take as one track."""
+
+    weight_acceleration: float = Field(
+        30.0,
+        gt=0,
+        le=1e9,
+        description="Typical acceleration of a blend weight (per second squared); smaller is "
+        "smoother.",
+    )
+
+
 class LayerConfig(StageConfig):
     """The corrective layer outside the model's space: offsets parallel to the picture."""
 
@@ -102,6 +114,9 @@ class RefinementConfig(StageConfig):
     )
     fit: PhotometricConfig = Field(
         default_factory=PhotometricConfig, description="Pose and expression from the pictures."
+    )
+    join: JoinConfig = Field(
+        default_factory=JoinConfig, description="The refined frames as one track."
     )
     offsets: LayerConfig = Field(default_factory=LayerConfig, description="The corrective layer.")
     overlay_frames: int = Field(
