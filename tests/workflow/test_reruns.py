@@ -21,7 +21,7 @@ AFTER_TRACKING = AFTER_CONTOURS | {
     "appearance", "photometric", "photometric_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
-    "landmarks", "identity", "tracking", "tracking_topology", "contour_detector", "contours",
+    "landmarks", "picture_identity", "tracking", "tracking_topology", "contour_detector", "contours",
 }  # fmt: skip
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
@@ -157,7 +157,7 @@ def test_line_of_code_in_the_tracking_module(finished):
     path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
         jobs = set(finished.would_run())
-    assert jobs == AFTER_TRACKING | {"identity", "tracking", "tracking_topology"}
+    assert jobs == AFTER_TRACKING | {"picture_identity", "tracking", "tracking_topology"}
 
 
 def test_camera_file(finished):

@@ -35,6 +35,30 @@ def of_identity_takes(pattern):
     return inputs
 
 
+def sampled_takes(wildcards):
+    """What the identity's script is told of each take of a subject."""
+    return [
+        {
+            "take": t.take,
+            "camera": mono_camera(t),
+            "neutral": t.first if t.is_multiview else None,
+            "chunks": len(chunks(t.subject, t.take)),
+        }
+        for t in identity_takes(wildcards)
+    ]
+
+
+def from_pictures():
+    """Regular expression of the subjects whose identity pictures tell of (none: matches nothing).
+
+    A model that a scan gave has no identities to choose from.
+    """
+    names = {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
+    if not CONFIG.tracking.identity.pictures.enabled:
+        names = set()
+    return "|".join(sorted(name.replace(".", r"\.") for name in names)) or "(?!)"
+
+
 rule identity:
     """Finds the person in landmarks of frames of all takes: subjects/{subject}/identity.npz."""
     input:
@@ -54,17 +78,45 @@ rule identity:
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
         code=code_of("identity"),
-        takes=lambda wildcards: [
-            {
-                "take": t.take,
-                "camera": mono_camera(t),
-                "neutral": t.first if t.is_multiview else None,
-                "chunks": len(chunks(t.subject, t.take)),
-            }
-            for t in identity_takes(wildcards)
-        ],
+        takes=sampled_takes,
     script:
         "../scripts/identity.py"
+
+
+rule picture_identity:
+    """Finds the person in landmarks and pictures together: subjects/{subject}/identity.npz."""
+    input:
+        tracker=tracker_of,
+        landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
+        cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
+        calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
+        pictures=lambda wildcards: [
+            path for take in identity_takes(wildcards) for path in mono_pictures(take)
+        ],
+    output:
+        identity=R + "/subjects/{subject}/identity.npz",
+        overlay=R + "/subjects/{subject}/overlay/identity.png",
+    log:
+        R + "/logs/picture_identity/{subject}.log",
+    benchmark:
+        R + "/benchmarks/picture_identity/{subject}.tsv"
+    wildcard_constraints:
+        subject=from_pictures(),
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of("tracking.fit", "tracking.identity", "refinement.overlay_frames"),
+        code=code_of("picture_identity"),
+        takes=lambda wildcards: [
+            row | {"source": mono_sources(take)}
+            for row, take in zip(sampled_takes(wildcards), identity_takes(wildcards))
+        ],
+    script:
+        "../scripts/picture_identity.py"
+
+
+ruleorder: picture_identity > identity
 
 
 def landmark_fit(wildcards=None):

@@ -40,6 +40,39 @@ class ModelFitConfig(StageConfig):
     )
 
 
+class PictureIdentityConfig(StageConfig):
+    """The person from the pictures as well: shape, albedo and light together (Lips16 3.2)."""
+
+    enabled: bool = Field(
+        True, description="Fit the person to the pictures of these frames; off: to landmarks alone."
+    )
+    spacing_mm: float = Field(
+        5.0, ge=0.5, le=20, description="Between places where model and picture are compared (mm)."
+    )
+    pixel_mm: float = Field(
+        8.0, ge=0.1, le=20, description="Pixel of the picture that is compared (mm at the face)."
+    )
+    sigma: float = Field(
+        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
+    )
+    robust_sigmas: float = Field(
+        2.0, gt=0.1, le=100, description="A place this far off counts half (deviations)."
+    )
+    strength: float = Field(
+        10.0, ge=0, le=1e6, description="How many independent places a face is worth."
+    )
+    albedo_prior: float = Field(
+        0.5,
+        ge=0,
+        le=100,
+        description="How many frames' worth the skin's one colour counts at each place.",
+    )
+    rounds: int = Field(
+        3, ge=1, le=20, description="Turns of light and visibility with the rest (count)."
+    )
+    iterations: int = Field(4, ge=1, le=50, description="Gauss-Newton steps of a turn (count).")
+
+
 class IdentityConfig(StageConfig):
     """The person, from a few frames of all of a subject's takes."""
 
@@ -65,6 +98,9 @@ class IdentityConfig(StageConfig):
         gt=0.001,
         le=2,
         description="Deviation of the logarithm of an unknown focal length about the assumed one.",
+    )
+    pictures: PictureIdentityConfig = Field(
+        default_factory=PictureIdentityConfig, description="The person from the pictures as well."
     )
 
 

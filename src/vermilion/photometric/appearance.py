@@ -90,25 +90,25 @@ def estimate_appearance(
     """
     finest, trust = seen.colours[:, 0], seen.trust
     basis = harmonics(seen.normals)
-    skin = _middle(finest, trust)
+    skin = middle_colour(finest, trust)
     light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
     for _ in range(_ROUNDS):
         shading = irradiance(seen.normals, light)
-        skin = _middle(finest / shading, trust)
-        albedo = _fit_albedo(finest, shading, trust, skin, albedo_prior)
+        skin = middle_colour(finest / shading, trust)
+        albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
     # No picture tells a bright light on dark skin from a dim one on fair skin, nor their colours:
     # the light on the face is white on the whole, the skin as bright as skin is.
     weight = trust / max(trust.sum(), 1e-12)
     mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
     light = light / mean
-    skin = _middle(finest / irradiance(seen.normals, light), trust)
+    skin = middle_colour(finest / irradiance(seen.normals, light), trust)
     light = light * (skin.mean() / SKIN_ALBEDO)
     skin = skin * (SKIN_ALBEDO / skin.mean())
     shading = irradiance(seen.normals, light)
     albedo = np.stack(
         [
-            _fit_albedo(seen.colours[:, level], shading, trust, skin, albedo_prior)
+            fit_albedo(seen.colours[:, level], shading, trust, skin, albedo_prior)
             for level in range(seen.colours.shape[1])
         ]
     )
@@ -120,7 +120,7 @@ def estimate_appearance(
     )
 
 
-def _middle(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
+def middle_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
     """Median colour (3,) of what is well seen."""
     return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
 
@@ -147,7 +147,7 @@ def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
     return light
 
 
-def _fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4):
+def fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4):
     """(N, 3) albedo under a known light, drawn to `skin` (3,) by `prior` frames' worth."""
     robust = np.ones_like(colours)
     level = (skin * shading.reshape(-1, 3).mean(axis=0)) ** 2 / skin**2

@@ -12,6 +12,7 @@ import numpy as np
 
 from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
+from vermilion.tracking.descent import NormalEquations, descend, pressed
 from vermilion.tracking.expression import N_POSE, FitSettings
 from vermilion.tracking.observation import (
     LandmarkNoise,
@@ -89,27 +90,11 @@ def fit_identity(
     model: FaceModel, samples: list[TakeSample], settings: IdentitySettings | None = None
 ) -> IdentityFit:
     """Fit one person. Raises InputError where no sampled frame has landmarks."""
-    settings = settings or IdentitySettings()
-    problem = _IdentityProblem(model, samples, settings)
-    frames, shared = problem.first_guess()
-    cost = problem.cost(frames, shared)
-    for _ in range(settings.iterations):
-        frame_step, shared_step = problem.newton_step(frames, shared)
-        for scale in (1.0, 0.5, 0.25, 0.1, 0.03):
-            trial = problem.moved(frames, shared, frame_step, shared_step, scale)
-            trial_cost = problem.cost(*trial)
-            if trial_cost < cost:
-                break
-        else:
-            break
-        improvement, cost = cost - trial_cost, trial_cost
-        frames, shared = trial
-        if improvement < 1e-6 * cost:
-            break
-    return problem.result(frames, shared)
+    problem = IdentityProblem(model, samples, settings or IdentitySettings())
+    return problem.result(*problem.solve())
 
 
-class _IdentityProblem:
+class IdentityProblem:
     """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (198), log focal (takes)."""
 
     def __init__(self, model, samples, settings):
@@ -168,7 +153,8 @@ class _IdentityProblem:
         person = np.tensordot(shared[: self.n_identity], self.identities, axes=1)
         return self.shape.neutral_mm + person + offset
 
-    def _focal(self, shared: np.ndarray) -> np.ndarray:
+    def focal(self, shared: np.ndarray) -> np.ndarray:
+        """(F, 1) pixels."""
         return np.exp(shared[self.n_identity + 198 :])[self.take][:, None]
 
     def _residual(self, points: np.ndarray, focal: np.ndarray):
@@ -190,7 +176,7 @@ class _IdentityProblem:
         points = self._camera_points(frames, shared)
         if (points[..., 2] <= 1.0).any():
             return np.inf
-        _, _, residual = self._residual(points, self._focal(shared))
+        _, _, residual = self._residual(points, self.focal(shared))
         total = robust_cost(residual, self.settings.fit.noise.robust_sigmas).sum()
         total += 0.5 * (self.frame_prior * frames**2).sum()
         total += 0.5 * (self.shared_prior * self._shared_from_prior(shared) ** 2).sum()
@@ -203,7 +189,7 @@ class _IdentityProblem:
             frames[:, :3], self.reference, shape.points(frames[:, N_POSE:])
         )
         points = turned + frames[:, None, 3:6]
-        focal = self._focal(shared)
+        focal = self.focal(shared)
         image, white, residual = self._residual(points, focal)
         limit = self.settings.fit.noise.robust_sigmas
         root = np.sqrt(robust_weights(residual, limit))[..., None]
@@ -225,41 +211,45 @@ class _IdentityProblem:
         size = (self.n_frames, 132)
         return residual.reshape(size), by_frame.reshape(*size, -1), by_shared.reshape(*size, -1)
 
-    def newton_step(self, frames: np.ndarray, shared: np.ndarray):
-        """Gauss-Newton step with the weights that press against their bounds held."""
+    def normal_equations(self, frames: np.ndarray, shared: np.ndarray) -> NormalEquations:
+        """Of the energy at a state, no weight held."""
         residual, by_frame, by_shared = self._linearised(frames, shared)
-        frame_gradient = (residual[:, None] @ by_frame)[:, 0] + self.frame_prior * frames
-        shared_gradient = np.einsum("fr,frs->s", residual, by_shared)
-        shared_gradient += self.shared_prior * self._shared_from_prior(shared)
-        weights = frames[:, N_POSE:]
-        held = np.zeros(frames.shape, dtype=bool)
-        pull = frame_gradient[:, N_POSE:]
-        held[:, N_POSE:] = ((weights <= 0) & (pull > 0)) | ((weights >= 1) & (pull < 0))
-        by_frame = np.where(held[:, None], 0.0, by_frame)
-        frame_gradient = np.where(held, 0.0, frame_gradient)
         blocks = np.swapaxes(by_frame, 1, 2) @ by_frame
         diagonal = np.arange(blocks.shape[1])
-        blocks[:, diagonal, diagonal] += np.where(held, 1.0, self.frame_prior)
-        blocks[:, diagonal, diagonal] *= 1 + 1e-9
-        coupling = np.swapaxes(by_frame, 1, 2) @ by_shared
+        blocks[:, diagonal, diagonal] += self.frame_prior
         flat = by_shared.reshape(-1, by_shared.shape[-1])
-        system = flat.T @ flat + np.diag(self.shared_prior)
-        solved = np.linalg.solve(
-            blocks, np.concatenate([coupling, frame_gradient[..., None]], axis=-1)
+        shared_gradient = np.einsum("fr,frs->s", residual, by_shared)
+        return NormalEquations(
+            blocks,
+            np.swapaxes(by_frame, 1, 2) @ by_shared,
+            flat.T @ flat + np.diag(self.shared_prior),
+            (residual[:, None] @ by_frame)[:, 0] + self.frame_prior * frames,
+            shared_gradient + self.shared_prior * self._shared_from_prior(shared),
         )
-        system -= np.einsum("fps,fpt->st", coupling, solved[..., :-1], optimize=True)
-        right = np.einsum("fps,fp->s", coupling, solved[..., -1]) - shared_gradient
+
+    def newton_step(self, frames: np.ndarray, shared: np.ndarray):
+        """Gauss-Newton step with the weights that press against their bounds held."""
+        found = self.normal_equations(frames, shared)
+        held = pressed(frames, found.frame_gradient)
+        gradient = np.where(held, 0.0, found.frame_gradient)
+        coupling = np.where(held[..., None], 0.0, found.coupling)
+        blocks = np.where(held[:, None] | held[..., None], 0.0, found.blocks)
+        diagonal = np.arange(blocks.shape[1])
+        blocks[:, diagonal, diagonal] += np.where(held, 1.0, 0.0)
+        blocks[:, diagonal, diagonal] *= 1 + 1e-9
+        solved = np.linalg.solve(blocks, np.concatenate([coupling, gradient[..., None]], axis=-1))
+        system = found.system - np.einsum("fps,fpt->st", coupling, solved[..., :-1], optimize=True)
+        right = np.einsum("fps,fp->s", coupling, solved[..., -1]) - found.shared_gradient
         shared_step = np.linalg.solve(system, right)
         frame_step = -(solved[..., -1] + solved[..., :-1] @ shared_step)
         return np.where(held, 0.0, frame_step), shared_step
 
-    def moved(self, frames, shared, frame_step, shared_step, scale):
-        frames = frames + scale * frame_step
-        frames[:, N_POSE:] = np.clip(frames[:, N_POSE:], 0.0, 1.0)
-        return frames, shared + scale * shared_step
+    def solve(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frames (F, 6 + K) and shared unknowns (S,) from landmarks alone."""
+        return descend(self, *self.first_guess(), self.settings.iterations)
 
     def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
-        image = project(self._camera_points(frames, shared), self._focal(shared))
+        image = project(self._camera_points(frames, shared), self.focal(shared))
         squared = ((image - self.image) ** 2).sum(axis=-1)[:, 17:]
         focal = np.exp(shared[self.n_identity + 198 :])
         known = [

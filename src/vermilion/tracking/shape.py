@@ -62,5 +62,10 @@ def without_size(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.nda
     what it does to the blend weights: on a smaller head the same motion needs smaller ones.
     """
     centred = neutral_mm - neutral_mm.mean(axis=0)
-    growth = np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()
-    return displacements_mm - growth[:, None, None] * centred
+    return displacements_mm - growth(displacements_mm, neutral_mm)[:, None, None] * centred
+
+
+def growth(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+    """Share (I,) of uniform growth of the neutral (N, 3) in displacements (I, N, 3)."""
+    centred = neutral_mm - neutral_mm.mean(axis=0)
+    return np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()
