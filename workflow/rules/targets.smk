@@ -59,6 +59,11 @@ def subject_outputs():
     """Files of every subject of the database, and identities of all that are tracked."""
     tracked = dict.fromkeys(take.subject for take in used_takes(("tattoo", "video")))
     paths = [f"{R}/subjects/{subject}/identity.npz" for subject in tracked]
+    paths += [
+        f"{R}/subjects/{subject}/overlay/identity.png"
+        for subject in tracked
+        if subject in pictured_subjects()
+    ]
     for subject in subjects("tattoo"):
         paths.append(f"{R}/subjects/{subject}/plain_texture.exr")
         paths.append(f"{R}/subjects/{subject}/correspondence.npz")

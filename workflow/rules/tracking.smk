@@ -48,15 +48,17 @@ def sampled_takes(wildcards):
     ]
 
 
-def from_pictures():
-    """Regular expression of the subjects whose identity pictures tell of (none: matches nothing).
-
-    A model that a scan gave has no identities to choose from.
-    """
-    names = {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
+def pictured_subjects():
+    """Subjects whose identity pictures tell of: a model that a scan gave has none to choose from."""
     if not CONFIG.tracking.identity.pictures.enabled:
-        names = set()
-    return "|".join(sorted(name.replace(".", r"\.") for name in names)) or "(?!)"
+        return set()
+    return {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
+
+
+def from_pictures():
+    """Regular expression of these subjects (none: matches nothing)."""
+    names = sorted(subject.replace(".", r"\.") for subject in pictured_subjects())
+    return "|".join(names) or "(?!)"
 
 
 rule identity:
