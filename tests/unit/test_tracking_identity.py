@@ -5,6 +5,7 @@ import pytest
 
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
+from vermilion.config.tracking import TrackingConfig
 from vermilion.errors import InputError
 from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.tracking.expression import FitSettings
@@ -105,3 +106,8 @@ def test_sampled_frames_are_spread_and_valid():
     assert valid["a"][chosen["a"]].all() and len(chosen["a"]) == 6
     assert chosen["a"][0] == 0 and chosen["a"][-1] == 98
     assert list(chosen["c"]) == [0, 1, 2]
+
+
+def test_one_bias_of_a_configuration_leaves_the_others():
+    bias = TrackingConfig(identity={"bias": {"jaw": 0.1}}).identity.bias
+    assert (bias.jaw, bias.mouth) == (0.1, IdentitySettings().bias.mouth)

@@ -19,6 +19,16 @@ class LandmarkGroups(StageConfig):
     mouth: float = Field(0.015, gt=0, le=1, description="Mouth (inter-ocular distances).")
 
 
+class LandmarkBiases(StageConfig):
+    """How far a person's landmarks lie from the model's in all frames alike."""
+
+    jaw: float = Field(0.08, gt=0, le=1, description="Jaw line (inter-ocular distances).")
+    brows: float = Field(0.05, gt=0, le=1, description="Brows (inter-ocular distances).")
+    nose: float = Field(0.04, gt=0, le=1, description="Nose (inter-ocular distances).")
+    eyes: float = Field(0.04, gt=0, le=1, description="Eyes (inter-ocular distances).")
+    mouth: float = Field(0.04, gt=0, le=1, description="Mouth (inter-ocular distances).")
+
+
 class ModelFitConfig(StageConfig):
     """How much landmarks, and how much blend weights, are trusted."""
 
@@ -79,10 +89,8 @@ class IdentityConfig(StageConfig):
     frames: int = Field(
         16, ge=1, le=200, description="Frames of all takes together, evenly spread (count)."
     )
-    bias: LandmarkGroups = Field(
-        default_factory=lambda: LandmarkGroups(
-            jaw=0.08, brows=0.05, nose=0.04, eyes=0.04, mouth=0.04
-        ),
+    bias: LandmarkBiases = Field(
+        default_factory=LandmarkBiases,
         description="Deviation of the person's landmarks, as the detector sees them, from the "
         "model's, the same in all frames.",
     )
