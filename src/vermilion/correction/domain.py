@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from vermilion.errors import InputError
 from vermilion.mesh import adjacency, unique_edges
 
 #: How stiff a follower's triangle is beside one of the mask.
@@ -61,7 +62,11 @@ def integration_domain(
     in_mask = np.zeros(n_vertices, dtype=bool)
     in_mask[triangles[mask]] = True
     if in_mask[triangles].all():
-        raise ValueError("the mask covers the whole mesh: nothing is left to hold it in place")
+        raise InputError(
+            "a correction mask that covers the whole mesh",
+            "vertices outside it, which hold the corrected mesh in place",
+            "Lower `correspondence.mask_radius_mm`.",
+        )
     followers = _followers(vertices_mm, triangles, in_mask)
     outside = ~(in_mask | followers)
 
