@@ -7,9 +7,15 @@ import pytest
 from tests.unit.synthetic_face import landmark_layout
 from vermilion.errors import InputError, ModelFileError
 from vermilion.frames import open_frames
-from vermilion.images import srgb_to_linear
+from vermilion.images import linear_to_srgb, srgb_to_linear
 from vermilion.landmarks.descent import DescentDetector, Similarity
-from vermilion.landmarks.networks import FACE_FILE, NetworkDetector, decode_heat_maps
+from vermilion.landmarks.network_input import network_input
+from vermilion.landmarks.networks import (
+    FACE_FILE,
+    NetworkDetector,
+    NetworkSettings,
+    decode_heat_maps,
+)
 from vermilion.landmarks.scheme import (
     BROWS,
     EYE_LEFT,
@@ -149,6 +155,17 @@ def test_heat_maps_are_decoded_to_their_cell_and_offset():
     assert points[5, 1] == pytest.approx(223 * (5 / 27 + shift), abs=0.01)
 
 
+def test_networks_take_srgb_at_224_pixels_normalised_whatever_the_picture_holds():
+    picture = np.linspace(-0.2, 1.3, 224 * 224 * 3, dtype=np.float32).reshape(224, 224, 3)
+    picture[5, 7] = np.nan
+    planes = network_input(picture)
+    picture[5, 7] = 0.0
+    expected = (linear_to_srgb(picture) - [0.485, 0.456, 0.406]) / [0.229, 0.224, 0.225]
+    # A hundredth of a step of 8 bits.
+    assert np.abs(planes.transpose(1, 2, 0) - expected).max() < 0.01 / 255 / 0.229
+    assert network_input(np.zeros((31, 45, 3), dtype=np.float32)).shape == (3, 224, 224)
+
+
 def test_missing_networks_are_named(tmp_path):
     with pytest.raises(InputError, match=FACE_FILE):
         NetworkDetector(tmp_path)
@@ -163,6 +180,9 @@ def test_networks_find_a_rendered_face_the_same_wherever_it_lies(data_root):
     assert found.found and found.confidence.mean() > 0.7
     moved = detector.detect(np.pad(picture, ((40, 0), (60, 0), (0, 0)), mode="edge"))
     size = face_size_px(found.points_px)
+    settled = NetworkDetector(data_root / "landmarks66", NetworkSettings(passes=6)).detect(picture)
+    moves = np.linalg.norm(settled.points_px - found.points_px, axis=1)
+    assert moves.mean() < 0.02 * size
     away = np.linalg.norm(moved.points_px - [60, 40] - found.points_px, axis=1)
     assert away.mean() < 0.02 * size
     assert not detector.detect(np.full((200, 300, 3), 0.4, dtype=np.float32)).found

@@ -19,11 +19,11 @@ class NetworksConfig(StageConfig):
         0.6, ge=0.0, le=1.0, description="Least mean confidence of a face's landmarks (0 to 1)."
     )
     passes: int = Field(
-        3,
+        2,
         ge=1,
         le=8,
-        description="Crops a face: the first round the face box, the others round the landmarks of "
-        "the crop before (count).",
+        description="Crops a face: the first where its box lets landmarks be expected, the others "
+        "round the landmarks of the crop before (count).",
     )
 
 
