@@ -135,6 +135,16 @@ def test_refinement_switched_off(finished):
     assert not jobs & {"appearance", "photometric", "photometric_join", "residuals", "ablations"}
 
 
+def test_identity_from_landmarks_alone(finished):
+    def change(content):
+        content["tracking"] = {"identity": {"pictures": {"enabled": False}}}
+
+    with configured(finished, change):
+        jobs = set(finished.would_run())
+    assert {"identity", "tracking", "tracking_meshes", "train"} <= jobs
+    assert not jobs & {"picture_identity", "landmarks", "inpaint"}
+
+
 def test_relief_of_a_take(finished):
     def change(content):
         content["detail"] = {"shading": {"takes": [TAKE]}}
