@@ -108,7 +108,7 @@ rule picture_identity:
         mem_mb=1500,
         runtime=30,
     params:
-        cfg=cfg_of("tracking.fit", "tracking.identity", "refinement.overlay_frames"),
+        cfg=cfg_of("tracking.fit", "tracking.identity"),
         code=code_of("picture_identity"),
         takes=lambda wildcards: [
             row | {"source": mono_sources(take)}

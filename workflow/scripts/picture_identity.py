@@ -19,6 +19,8 @@ from vermilion.tracking.sampling import sample_takes
 from vermilion.tracking.settings import identity_settings
 
 STEPS = ("landmarks", "with pictures")
+#: Frames of the overlay: no key, as another number would make all that follows the identity again.
+SHOWN = 4
 
 
 def main(snakemake):
@@ -56,7 +58,7 @@ def main(snakemake):
     fit = joint.person
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
     print(f"residual {before:.2f} to {after:.2f} display values, {len(wanted)} frames")
-    count = min(cfg["refinement.overlay_frames"], len(sheets))
+    count = min(SHOWN, len(sheets))
     shown = np.linspace(0, len(sheets) - 1, count).round().astype(int)
     rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in np.unique(shown)]
     write_srgb8(snakemake.output.overlay, tile(rows, 1))
