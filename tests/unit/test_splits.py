@@ -101,6 +101,23 @@ def test_a_take_held_out_whole_is_in_no_regressor(tmp_path):
                 np.testing.assert_array_equal(model.training_frames["bo/rom"], [0, 1, 2, 6, 7, 8])
 
 
+def test_a_regressor_for_strangers_is_chosen_by_people_whom_it_has_not_seen(tmp_path):
+    takes = [take_of(name, "rom", "train") for name in ("ana", "bo", "cy", "di")]
+    write(tmp_path / "lips.h5", takes)
+    place = (NAMES, np.arange(2), np.ones(2), topology_hash(TRIANGLES), np.arange(4))
+    chosen = Selection(folds=5, clip_frames=2)
+    with LipDatabase(tmp_path / "lips.h5") as database:
+        frames = {}
+        for name, people in (("MS", 4), ("GR-ana", 3), ("GR-ana-affine", 3)):
+            data = database.training_set(training_subjects(name, database.subjects))
+            assert len(data.subjects) == people
+            frames[name] = list(train(name, data, *place, chosen)[1].frames)
+        assert len(frames["MS"]) == 5  # folds of clips
+        assert frames["GR-ana"] == frames["GR-ana-affine"] == [12, 12, 12]  # a person each
+        two = database.training_set(["bo", "cy"])
+        assert len(train("GR-ana", two, *place, chosen)[1].frames) == 5  # too few to tell
+
+
 @pytest.mark.parametrize("split", ["train", "test", "none", "test:0-4,8-8"])
 def test_a_frame_trains_or_is_held_out_but_never_both(split):
     take = take_of("ana", "rom", split)

@@ -52,7 +52,7 @@ class TrainingConfig(StageConfig):
         description="Tikhonov parameters of the affine regressor that cross-validation tries.",
     )
     kernel_alphas: list[Positive] = Field(
-        [1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0],
+        [1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0],
         min_length=1,
         description="Noise variances of the kernel regressor that cross-validation tries.",
     )

@@ -1,4 +1,4 @@
-"""Choice of alpha and beta by cross-validation grouped by clip.
+"""Choice of alpha and beta by cross-validation grouped by clip, or by person.
 
 All that the errors need of the targets is their Gram matrix Y Y' (F, F): it is formed once, in
 place of predictions of 9 T outputs for every grid point. For one beta and fold, one eigenvalue
@@ -119,7 +119,7 @@ def cross_validate(
         gram: (F, F), `target_gram` of the targets.
         n_outputs: the sum of the output weights (their number where unweighted).
         sequences: (F,) labels of the sequences, frames in order of time.
-        clips: (F,) labels of the clips, which are held out whole.
+        clips: (F,) labels of the clips, or of the people, which are held out whole.
         betas: None for an estimator without.
         persons: (F,) in 0 .. G - 1 for a bias each, or None.
     """
