@@ -70,7 +70,8 @@ def strategies(estimators: pd.DataFrame) -> str:
         "mean_mm": "tracking error, mm", "low_mm": "low", "high_mm": "high", "std_mm": "deviation, mm",
     }  # fmt: skip
     note = (
-        "<p>Each with the parameters that cross-validation over clips chose (of PS and GR: the median over "
+        "<p>Each with the parameters that cross-validation chose, over clips, for GR over people where at "
+        "least three train (of PS and GR: the median over "
         "the people). Lips16, on its data: 0.13 for the RBF network, 0.14 for the affine map.</p>"
     )
     shown = _digits(estimators[several], ["alpha", "beta", "feature_error", "deviation"])

@@ -144,7 +144,9 @@ def train(
     vertices: np.ndarray,
     selection: Selection,
 ) -> tuple[LipModel, Curve]:
-    """Choose alpha and beta by cross-validation of the layers over clips, then fit on all of `data`.
+    """Choose alpha and beta by cross-validation of the layers, then fit on all of `data`.
+
+    Folds hold out whole clips; those of GR hold out whole people.
 
     Args:
         name: of the regressor, with its variant.
