@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -34,15 +35,16 @@ SETTINGS = MultiviewConfig(
 CFG = {f"multiview.{key}": value for key, value in SETTINGS.model_dump(mode="json").items()}
 
 
-def make_capture(root, rig, lost=(), save=None):
+def make_capture(root, rig, lost=(), save=None, placed=lambda vertices: vertices, marks_mm=0):
     """Pictures, cameras, landmarks and a template that is of another face, of four frames.
 
-    `save(picture, camera, folder, stem)` writes a picture; PNG by default.
+    `save(picture, camera, folder, stem)` writes a picture; PNG by default. `placed(vertices)` is
+    where the head is; landmarks are marked `marks_mm` beside their places.
     """
     person = lip_patch.face_model()
     write_cameras(root / "cameras", rig)
     for frame, pose in enumerate(POSES):
-        vertices = lip_patch.vertices_at(*pose)
+        vertices = placed(lip_patch.vertices_at(*pose))
         for name, camera in rig.items():
             if (frame, name) in lost:
                 continue
@@ -58,7 +60,8 @@ def make_capture(root, rig, lost=(), save=None):
     wrong = person.neutral_mm * [1.04, 0.97, 1.1] + [0.3, -0.2, 0.5]
     replace(person, neutral_mm=wrong, landmarks=landmarks).save(root / "template.npz")
     noise = np.random.default_rng(0).normal(0, 0.5, (len(rig), 66, 2))
-    points = np.stack([c.project(person.neutral_mm[landmarks]) for c in rig.values()]) + noise
+    marked = placed(person.neutral_mm[landmarks] + marks_mm)
+    points = np.stack([c.project(marked) for c in rig.values()]) + noise
     confidence = np.full((len(rig), 66), 0.9)
     np.savez(
         root / "views.npz", cameras=np.array(list(rig)), points_px=points, confidence=confidence
@@ -95,7 +98,7 @@ def neutral(root):
     run_script(
         "multiview_neutral",
         wildcards=PLACE,
-        params={"cfg": CFG, "source": str(root / "rom"), "frame": 0},
+        params={"cfg": CFG, "source": str(root / "rom"), "frame": 0, "first": {}},
         input=inputs(root),
         output={
             "neutral": root / "neutral.npz",
@@ -294,3 +297,76 @@ def test_a_chunk_without_a_readable_frame_still_ends(take):
 def test_the_neutral_frame_is_the_neutral(take):
     neutral = np.load(take / "neutral.npz")["vertices_mm"].astype(np.float32)
     assert np.array_equal(read_sequence(take / "H/000000-000003.npy")[0], neutral)
+
+
+def later_neutral(take, root, rig, first):
+    """The neutral of a later take in `root`; `first` as the rule's parameter says it."""
+    run_script(
+        "multiview_neutral",
+        wildcards={**PLACE, "take": "rom2"},
+        params={"cfg": CFG, "source": str(root / "rom"), "frame": 0, "first": first},
+        input={
+            "template": root / "template.npz",
+            "cameras": root / "cameras",
+            "landmarks": root / "views.npz",
+            "first_neutral": take / "neutral.npz",
+            "first_cameras": take / "cameras",
+        },
+        output={
+            "neutral": root / "neutral.npz",
+            "cloud": root / "cloud_neutral.ply",
+            "surface": root / "surface_neutral.ply",
+            "overlay": root / "neutral.png",
+        },
+    )
+    return dict(np.load(root / "neutral.npz"))
+
+
+@pytest.fixture(scope="module")
+def later_take(take, tmp_path_factory):
+    """Another take of the same person: the head is elsewhere, landmarks are marked otherwise."""
+    root = tmp_path_factory.mktemp("later")
+    turn = cv2.Rodrigues(np.radians([2.0, -4.0, 3.0]))[0]
+    shift = np.array([1.5, -1.0, 2.0])
+    along = np.array([1.5, 0.5, 0.0])
+    make_capture(root, lip_patch.cameras(), placed=lambda v: v @ turn.T + shift, marks_mm=along)
+    first = {"take": "rom", "frame": 0, "source": str(take / "rom"), "cfg": CFG}
+    return root, first, turn, shift
+
+
+def test_a_later_take_carries_the_points_of_the_first(take, later_take):
+    root, first, turn, shift = later_take
+    alone = later_neutral(take, root, lip_patch.cameras(), {})
+    found = later_neutral(take, root, lip_patch.cameras(), first)
+    goal = np.load(take / "neutral.npz")["vertices_mm"] @ turn.T + shift
+    face = lip_patch.face_model().regions["face"]
+    off, slid = (
+        np.linalg.norm(neutral["vertices_mm"] - goal, axis=1)[face] for neutral in (found, alone)
+    )
+    assert np.median(off) < 0.1 and np.percentile(off, 95) < 0.4
+    assert np.median(slid) > 3 * np.median(off)  # the template by itself marks other places
+    assert found["first_take"] == "rom" and alone["first_take"] == ""
+    assert np.allclose(
+        found["moved_mm"], np.linalg.norm(found["vertices_mm"] - alone["vertices_mm"], axis=1)
+    )
+
+
+def test_a_rig_with_other_cameras_keeps_its_own_neutral_and_says_so(take, later_take, capsys):
+    root, first, _, _ = later_take
+    other = take / "other_cameras"
+    write_cameras(
+        other, {f"x{n}": replace(c, name=f"x{n}") for n, c in lip_patch.cameras().items()}
+    )
+    for name in lip_patch.cameras():
+        (take / f"rom/frames/x{name}").symlink_to(take / f"rom/frames/{name}")
+    alone = later_neutral(take, root, lip_patch.cameras(), {})
+    (take / "cameras").rename(take / "kept_cameras")
+    other.rename(take / "cameras")
+    try:
+        found = later_neutral(take, root, lip_patch.cameras(), first)
+    finally:
+        (take / "cameras").rename(other)
+        (take / "kept_cameras").rename(take / "cameras")
+    assert np.array_equal(found["vertices_mm"], alone["vertices_mm"])
+    printed = capsys.readouterr().out
+    assert "s1/rom2: found no camera in common" in printed and "overlays" in printed

@@ -99,9 +99,9 @@ def test_image_of_one_frame(finished, tmp_path):
     write_image(tmp_path / "darker.png", read_image(path) * 0.9)
     with changed(path, (tmp_path / "darker.png").read_bytes()):
         jobs = finished.would_run()
-    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras"}
+    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras", "plain_texture"}
     assert jobs["capture"] == 1  # the chunk that holds it
-    assert jobs["multiview_neutral"] == 1  # of this take only
+    assert jobs["multiview_neutral"] == 2  # of this take, and of the plain one on its points
 
 
 def test_touched_image_with_the_same_content(finished):

@@ -45,9 +45,44 @@ ANCHORS = R + "/takes/{subject}/{take}/multiview/anchors/{clip}.npz"
 CLIPS = R + "/takes/{subject}/{take}/multiview/clips/{clip}.npz"
 
 
+def first_take(wildcards):
+    """The take whose points of the skin this one's vertices mark too; None: it is the first."""
+    found = takes("tattoo", wildcards.subject)
+    if not found or found[0].take == wildcards.take or not CONFIG.multiview.neutral.same_points:
+        return None
+    return found[0]
+
+
+def first_neutral(wildcards):
+    """Neutral, cameras and pictures of the person's first take, for the later ones (`unpack`)."""
+    first = first_take(wildcards)
+    if first is None:
+        return {}
+    folder = f"{R}/takes/{first.subject}/{first.take}"
+    return {
+        "first_neutral": f"{folder}/multiview/neutral.npz",
+        "first_cameras": f"{folder}/cameras",
+        "first_manifest": f"{folder}/capture/{chunks(first.subject, first.take)[0]}.json",
+    }
+
+
+def first_place(wildcards):
+    """Name, frame and source of that take, and how it is registered; empty for the first."""
+    first = first_take(wildcards)
+    if first is None:
+        return {}
+    return {
+        "take": first.take,
+        "frame": first.first,
+        "source": source_of(first),
+        "cfg": cfg_of("multiview.refine"),
+    }
+
+
 rule multiview_neutral:
     """Registers the template to the take's first frame: neutral.npz and its cloud (Lips16 3.1)."""
     input:
+        unpack(first_neutral),
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
         landmarks=R + "/takes/{subject}/{take}/landmarks/views_neutral.npz",
@@ -69,6 +104,7 @@ rule multiview_neutral:
         code=code_of("multiview_neutral"),
         source=source_of,
         frame=lambda wildcards: take_of(wildcards).first,
+        first=first_place,
     script:
         "../scripts/multiview_neutral.py"
 

@@ -114,6 +114,11 @@ class NeutralConfig(StageConfig):
         le=90,
         description="Pairs of cameras above this angle are not polished (degrees).",
     )
+    same_points: bool = Field(
+        True,
+        description="Later takes of a person carry the same points of the skin as the first: the first "
+        "one's neutral is registered to theirs by the pictures. Off: each take for itself.",
+    )
 
 
 class TrackConfig(StageConfig):

@@ -40,13 +40,16 @@ def read_views(
 
 
 def write_neutral(path: str | Path, neutral: Neutral) -> None:
-    """`.npz`: vertices_mm (V, 3); information (V,) 1/mm^2; landmarks_mm (66, 3), NaN unknown."""
+    """`.npz`: vertices_mm (V, 3); information (V,) 1/mm^2; landmarks_mm (66, 3), NaN unknown;
+    first_take, moved_mm (V,) of a later take of the person."""
     _save(
         path,
         vertices_mm=neutral.vertices_mm,
         information_per_mm2=neutral.information,
         landmarks_mm=neutral.landmarks.points_mm,
         landmarks_residual_px=neutral.landmarks.residual_px,
+        first_take=np.array(neutral.first_take),
+        moved_mm=np.broadcast_to(neutral.moved_mm, len(neutral.vertices_mm)),
     )
 
 

@@ -65,6 +65,8 @@ class Neutral:
         landmarks: what was triangulated.
         cloud: fused points of the face.
         surface: screened Poisson surface of the cloud.
+        first_take: whose points of the skin the vertices are; empty: this take's own fit.
+        moved_mm: (V,) from this take's own fit to those points; zero where there is none.
     """
 
     vertices_mm: np.ndarray
@@ -72,6 +74,8 @@ class Neutral:
     landmarks: Triangulated
     cloud: Cloud
     surface: Mesh
+    first_take: str = ""
+    moved_mm: np.ndarray | float = 0.0
 
 
 def stereo_cloud(frame: Frame, target_mm: np.ndarray, settings: StereoSettings) -> Cloud:

@@ -96,7 +96,10 @@ def _mean_axis(frame: Frame) -> np.ndarray:
 def neutral_sheet(
     frame: Frame, neutral: Neutral, triangles: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """Wires, mesh, cloud, Poisson surface and certainty of the neutral in two cameras."""
+    """Wires, mesh, cloud, Poisson surface and certainty of the neutral in two cameras.
+
+    For a later take of a person also how far its own fit lay from the first take's points.
+    """
     pictures = []
     error = np.where(
         neutral.information > 0, 1.0 / np.sqrt(np.maximum(neutral.information, 1e-12)), np.nan
@@ -120,7 +123,12 @@ def neutral_sheet(
                 "expected error, 0 to 0.3 mm",
             ),
         ]
-    return tile(pictures, 6)
+        if neutral.first_take:
+            moved = colour_map(neutral.moved_mm, 0.0, 5.0)
+            text = f"to the points of {neutral.first_take}, 0 to 5 mm"
+            mesh = draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles, moved)
+            pictures.append(label(mesh, text))
+    return tile(pictures, 7 if neutral.first_take else 6)
 
 
 def frames_sheet(

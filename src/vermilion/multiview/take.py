@@ -179,12 +179,28 @@ class Refiner:
         finest = self.references[self.settings.scales[-1]]
         if number == finest.frame.number:
             return self._neutral(frame, finest)
+        return self.register(frame, start_mm)
+
+    def register(
+        self, frame: Frame, start_mm: np.ndarray, *, from_afar: bool = False
+    ) -> RefinedFrame:
+        """Register the pictures of a frame, be it of this take or of another one of the person.
+
+        Args:
+            frame: full-size pictures of cameras named as those of the neutral.
+            start_mm: (V, 3).
+            from_afar: begin with a round of twice the stiffness.
+        """
+        number, finest = frame.number, self.references[self.settings.scales[-1]]
         if not set(frame.views) & set(finest.sights):
             return self._failed(number, start_mm, "no camera in common with the neutral's frame")
         cloud = self._cloud(frame, start_mm)
+        rounds = list(zip(self.settings.scales, self.settings.lengths_mm, strict=True))
+        if from_afar:
+            rounds.insert(0, (rounds[0][0], 2 * rounds[0][1]))
         levels = [
             (self.references[scale], self.pictures.at(frame, scale), length)
-            for scale, length in zip(self.settings.scales, self.settings.lengths_mm, strict=True)
+            for scale, length in rounds
         ]
         registered = register_frame(
             levels,
