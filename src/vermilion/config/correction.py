@@ -20,17 +20,16 @@ class LayersConfig(StageConfig):
         "motion removed on that region, then aligned to the coarse mesh once, at the neutral.",
     )
     region: Literal["rigid", "face"] = Field(
-        "rigid",
-        description="What the accurate mesh is aligned by. `rigid`: forehead, temples and bridge of the "
-        "nose, as far as they fit. `face`: all of the face outside the mask, by area, as the evaluation "
-        "aligns; displacements then take up more of the tracker's own errors, which are those of one "
-        "camera: better on its held-out frames, worse in the picture and under another camera.",
+        "face",
+        description="What the accurate mesh is aligned by. `face`: all of the face outside the mask, by "
+        "area, as the evaluation aligns. `rigid`: forehead, temples and bridge of the nose, as far as they "
+        "fit; what the tracker gets wrong of the face as a whole then stays in the corrected mesh.",
     )
     max_alignment_mm: float = Field(
         6.0,
         gt=0.0,
         le=50.0,
-        description="A frame is flagged where the aligned rigid regions differ by more (RMS, mm).",
+        description="A frame is flagged where the aligned regions differ by more (RMS, mm).",
     )
 
 

@@ -26,7 +26,7 @@ class TakeLayers:
         layers: (F, T, 9) float32 over the correspondence's mask; zero where not valid.
         coarse_mm, accurate_mm: (F, V, 3) C and H on C's topology, head frame.
         valid: (F,) bool.
-        alignment_mm: (F,) RMS of the rigid regions against each other.
+        alignment_mm: (F,) RMS of the aligned regions against each other.
         strength: (F,) RMS of the layer's entries.
         folded: (F,) share of the mask's triangles turned by over a right angle.
     """
@@ -113,7 +113,7 @@ def quality_rows(
 
     Args:
         tracked, reconstructed: (F,) bool, what the earlier stages say of C and H.
-        max_alignment_mm: of the rigid regions against each other (RMS).
+        max_alignment_mm: of the aligned regions against each other (RMS).
 
     Returns:
         (layers with `valid` narrowed, a row a frame).
@@ -128,7 +128,7 @@ def quality_rows(
         elif not made.valid[k]:
             reason = "a mesh with vertices that are not finite"
         elif made.alignment_mm[k] > max_alignment_mm:
-            reason = f"rigid regions {made.alignment_mm[k]:.1f} mm apart"
+            reason = f"aligned regions {made.alignment_mm[k]:.1f} mm apart"
         figures = {
             "alignment_mm": float(made.alignment_mm[k]),
             "strength": float(made.strength[k]),
