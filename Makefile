@@ -37,12 +37,11 @@ report: $(READY)
 verify: $(READY)
 	@$(BIN)/python -m vermilion.workflow.checksums "$(RESULTS)"
 
-test: $(READY)
-	$(BIN)/python -m pytest -m "not slow"
-	$(BIN)/python -m pytest -m slow
+test: test-quick
+	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadgroup -m slow
 
 test-quick: $(READY)
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadgroup -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check .
