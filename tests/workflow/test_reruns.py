@@ -16,7 +16,7 @@ AFTER_TRAINING = {
     "evaluate", "evaluation_figures", "measures", "apply", "apply_export", "quality", "summary",
 }  # fmt: skip
 AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
-AFTER_CONTOURS = AFTER_FEATURES | {"features"}
+AFTER_CONTOURS = AFTER_FEATURES | {"features", "neutral_pair"}
 AFTER_TRACKING = AFTER_CONTOURS | {
     "appearance", "photometric", "photometric_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
@@ -174,5 +174,5 @@ def test_camera_file(finished):
     path = finished.folder / "captures" / TAKE / "cameras" / "images.txt"
     with changed(path, path.read_bytes() + b"# checked\n"):
         jobs = finished.would_run()
-    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras"}
+    assert set(jobs) == AFTER_CAMERAS | {"capture", "cameras", "plain_texture"}
     assert jobs["cameras"] == 1  # of this take only

@@ -8,6 +8,15 @@ def apply_model(wildcards):
     return f"{R}/models/{CONFIG.apply.regressor.replace('{subject}', wildcards.subject)}.h5"
 
 
+def apply_neutral(wildcards):
+    """The neutral of a person whom the regressor was not trained on, if it is known (`unpack`)."""
+    name = CONFIG.apply.regressor.replace("{subject}", wildcards.subject)
+    known = wildcards.subject in trained_on(name, trained_subjects())
+    if known or not takes("tattoo", wildcards.subject):
+        return {}
+    return {"neutral_pair": f"{R}/subjects/{wildcards.subject}/neutral_pair.npz"}
+
+
 def apply_exports():
     """Outputs of a corrected take; USD and OBJ as the configuration asks."""
     outputs = {
@@ -63,6 +72,7 @@ rule apply:
     """Corrects a chunk of a take and draws original, base and corrected side by side."""
     input:
         unpack(mono_inputs),
+        unpack(apply_neutral),
         tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",

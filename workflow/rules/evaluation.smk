@@ -45,6 +45,7 @@ rule evaluate:
         template=R + "/face/template.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         identity=R + "/subjects/{subject}/identity.npz",
+        neutral_pair=R + "/subjects/{subject}/neutral_pair.npz",
         shapes=R + "/evaluation/lip_shapes.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),

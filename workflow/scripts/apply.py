@@ -6,6 +6,7 @@ from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.apply import correct_sequence
+from vermilion.correction.neutral_pair import NeutralPair, acquainted
 from vermilion.correction.picture import (
     PICTURE_ARRAYS,
     Picture,
@@ -40,6 +41,8 @@ def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
     tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
+    if inputs.get("neutral_pair"):
+        model = acquainted(model, NeutralPair.load(inputs.neutral_pair), tracker.triangles)
     identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
     settings = CorrectionConfig(
         integration=params.cfg["correction.integration"], picture=params.cfg["correction.picture"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.evaluation.table1 import in_order, kind_of, place_of
+from vermilion.evaluation.table1 import in_order, is_variant, kind_of, place_of
 from vermilion.plot import new_figure, plain, save, with_gaps
 
 COLOURS = {
@@ -70,7 +70,7 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
     Variants are shown of all takes together alone.
     """
     whole = (table["subject"] == "all") & (table["take"] == "all")
-    table = table[whole | ~table["regressor"].str.contains("/")]
+    table = table[whole | ~table["regressor"].map(is_variant)]
     groups = list(table.groupby(["subject", "take"], sort=False))
     figure = new_figure(8.6, 0.9 + 0.26 * (len(table) + 1.5 * len(groups)))
     axis = figure.subplots()

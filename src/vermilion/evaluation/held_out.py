@@ -14,6 +14,7 @@ from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
 from vermilion.evaluation.reference import Reference, truth_of_vertices
+from vermilion.evaluation.table1 import is_variant
 from vermilion.evaluation.take import TakeResult
 from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
@@ -155,7 +156,7 @@ def shown_arrays(
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = shown_rows(base, count)
     rotations, translations = (part[chosen] for part in result.head)
-    names = [name for name in result.aligned_mm if "/" not in name]
+    names = [name for name in result.aligned_mm if not is_variant(name)]
     of_truth = {"base": neutral_mm, "contour": neutral_mm}
     used = np.unique(reference.triangles)
     lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]

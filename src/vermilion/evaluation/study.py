@@ -8,6 +8,7 @@ import pandas as pd
 from vermilion import page
 from vermilion.evaluation.mouth_kinds import KINDS
 from vermilion.evaluation.statements import statements
+from vermilion.evaluation.table1 import is_variant
 
 _LACKING = (
     '<p class="none">Nothing was trained for this: <code>evaluation.variants</code> names what is '
@@ -90,7 +91,7 @@ def kinds(table: pd.DataFrame) -> str:
     }  # fmt: skip
     order = rows["kind"].map({kind: k for k, kind in enumerate(KINDS)})
     rows = rows.iloc[np.argsort(order, kind="stable")]
-    rows = rows[~rows["regressor"].str.contains("/")]
+    rows = rows[~rows["regressor"].map(is_variant)]
     note = (
         "<p>Mean vertex error over the mouth mask by kind of mouth shape, all takes together. The vermilion "
         "alone, and variants, are in <code>kinds.tsv</code>.</p>"

@@ -11,7 +11,7 @@ import pandas as pd
 from vermilion import page
 from vermilion.evaluation import study
 from vermilion.evaluation.how_measured import how_measured
-from vermilion.evaluation.table1 import in_order, place_of
+from vermilion.evaluation.table1 import in_order, is_variant, place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
 REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
@@ -127,7 +127,7 @@ _MAP_CAPTION = (
 def _key_figures(found: Findings) -> str:
     items = []
     rows = _together(found.table1).set_index("regressor")
-    for name in in_order(name for name in rows.index if "/" not in name):
+    for name in in_order(name for name in rows.index if not is_variant(name)):
         row = rows.loc[name]
         if name == "base":
             items.append((f"{row['mean_mm']:.2f} mm", "base track, mean error over the mouth"))
@@ -157,7 +157,7 @@ def _table1(found: Findings) -> str:
         "over clips. Lips16 reports 4.0 mm for its base tracker and 3.3, 3.0 and 3.2 mm for PS, MS "
         "and GR on its own data."
     )
-    own = rows[~rows["regressor"].str.contains("/")]
+    own = rows[~rows["regressor"].map(is_variant)]
     tables = page.table(own, headings, "where")
     if len(own) < len(rows):
         tables += page.folded("With all variants", page.table(rows, headings, "where"))

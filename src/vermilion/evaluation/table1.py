@@ -15,6 +15,14 @@ def kind_of(regressor: str) -> str:
     return f"{kind}/{variant}" if variant else kind
 
 
+def is_variant(regressor: str) -> bool:
+    """Whether a row is of another estimator, features or method than the configured ones.
+
+    GR with the person's neutral (`GR/neutral`) is none: it is the same regressor, told more.
+    """
+    return regressor.partition("/")[2] not in ("", "neutral")
+
+
 def place_of(subject: str, take: str) -> str:
     """Which frames a row is about, as a reader says it."""
     if subject != "all":
@@ -28,7 +36,7 @@ def in_order(regressors) -> list[str]:
     def place(name: str):
         kind, _, variant = kind_of(name).partition("/")
         rank = _ORDER.index(kind) if kind in _ORDER else len(_ORDER)
-        return bool(variant), rank, name
+        return is_variant(name), rank, variant, name
 
     return sorted(set(regressors), key=place)
 

@@ -17,7 +17,7 @@ from tests.stages.test_correction import (
     run_train,
 )
 from vermilion.config.apply import OverlayConfig
-from vermilion.config.correction import PictureConfig
+from vermilion.config.correction import LayersConfig, PictureConfig
 from vermilion.config.evaluation import (
     ContourConfig,
     EvaluationConfig,
@@ -63,6 +63,7 @@ def scene(tmp_path_factory):
     for regressor in MODELS:
         run_train(root, regressor)
     run_lip_shapes(root)
+    run_neutral_pair(root)
     evaluate(root, "truth", truth=True)
     evaluate(root, "held_out", truth=False)
     return SimpleNamespace(root=root, tracker=tracker)
@@ -114,6 +115,28 @@ def run_lip_shapes(root):
     )
 
 
+def run_neutral_pair(root):
+    subject, take = root / f"subjects/{SUBJECT}", root / f"takes/{SUBJECT}/rom"
+    run_script(
+        "neutral_pair",
+        wildcards={"subject": SUBJECT},
+        params={
+            "cfg": {"correction.layers": LayersConfig().model_dump()}, "take": "rom", "first": 0,
+        },
+        input={
+            "template": root / "face/template.npz",
+            "tracker": root / "face/tracker.npz",
+            "accurate": take / "multiview/neutral.npz",
+            "coarse": take / f"tracking/C/{CHUNKS[0]}.npy",
+            "fit": take / "tracking/fit.npz",
+            "features": take / f"correction/features/{CHUNKS[0]}.npz",
+            "correspondence": subject / "correspondence.npz",
+            "identity": subject / "identity.npz",
+        },
+        output={"pair": subject / "neutral_pair.npz", "overlay": subject / "neutral_pair.png"},
+    )  # fmt: skip
+
+
 def evaluate(root, name, truth):
     take, out = root / f"takes/{SUBJECT}/rom", root / f"evaluation/{name}"
     known = [root / f"truth/{SUBJECT}/rom/{part}.npy" for part in ("vertices_mm", "triangles")]
@@ -122,6 +145,7 @@ def evaluate(root, name, truth):
         "template": root / "face/template.npz",
         "correspondence": root / f"subjects/{SUBJECT}/correspondence.npz",
         "identity": root / f"subjects/{SUBJECT}/identity.npz",
+        "neutral_pair": root / f"subjects/{SUBJECT}/neutral_pair.npz",
         "shapes": root / "evaluation/lip_shapes.npz",
         "fit": take / "tracking/fit.npz",
         "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],

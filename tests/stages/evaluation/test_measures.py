@@ -26,12 +26,14 @@ def values(root, name, region="mouth", measure="vertex_error_mean_mm"):
 def test_corrections_are_between_the_base_and_the_oracle(scene):
     error = values(scene.root, "truth")
     assert set(error.index) == {
-        "base", "oracle", "contour", "PS-ana", "MS", "GR-ana",
+        "base", "oracle", "contour", "PS-ana", "MS", "GR-ana", "GR-ana/neutral",
         *(f"MS/{variant}" for variant in ("rbf", "affine", "shape-only", "distances-only")),
     }  # fmt: skip
     assert error["oracle"] < 0.7 * error["base"]
     for regressor in ("PS-ana", "MS"):
         assert error["oracle"] < error[regressor] < error["base"]
+    # Who it is, is the larger part of a stranger's error, and one frame tells it.
+    assert error["GR-ana/neutral"] < 0.9 * error["GR-ana"]
     feature = values(scene.root, "truth", measure="feature_error")
     assert (feature > 0).all()
 

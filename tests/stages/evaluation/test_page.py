@@ -82,7 +82,7 @@ def test_every_comparison_of_section_6_is_there(tables):
     pairs = set(zip(rows["first"], rows["second"], strict=True))
     assert {
         ("MS/rbf", "MS/affine"), ("MS", "MS/shape-only"), ("MS", "MS/distances-only"),
-        ("MS", "MS/rbf"), ("GR", "contour"), ("PS", "base"),
+        ("MS", "MS/rbf"), ("GR", "contour"), ("PS", "base"), ("GR/neutral", "GR"),
     } <= pairs  # fmt: skip
     assert set(rows["measure"]) == {"vertex_error_mean_mm", "moving_error_mm", "feature_error"}
     features = read_table(tables / "table2.tsv")
@@ -97,7 +97,8 @@ def test_every_comparison_of_section_6_is_there(tables):
 
 def test_sheets_have_a_column_a_mesh(tables):
     size = CFG["evaluation.figures"]["map_size_px"]
-    columns = {"maps": 6, "renders": 8, "stretch": 7}  # base, contour, oracle, PS, MS, GR; truth
+    # base, contour, oracle, PS, MS, GR, GR with the neutral; truth
+    columns = {"maps": 7, "renders": 9, "stretch": 8}
     for name, count in columns.items():
         picture = cv2.imread(str(tables / SHEETS[name]))
         assert picture.shape[1] == count * size, name

@@ -1,0 +1,115 @@
+"""A person made known to a regressor by one pair of neutrals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vermilion.correction.layers import correction_layers
+from vermilion.correction.neutral_pair import NeutralPair, acquainted
+from vermilion.correspondence.correspondence import topology_hash
+from vermilion.errors import InputError
+from vermilion.regression.kernel import KernelRegressor
+from vermilion.regression.model import LipModel
+
+TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])
+MASK = np.array([1, 2])
+VERTICES = np.array([1, 2, 3, 4])
+NAMES = ("shape_01", "shape_02", "outer_width", "lower_lip_1")
+
+
+def shape(seed):
+    return np.random.default_rng(seed).normal(scale=30.0, size=(6, 3))
+
+
+@pytest.fixture
+def model():
+    """Of two people, each with a bias."""
+    rng = np.random.default_rng(0)
+    features, targets = rng.normal(size=(60, 3)), rng.normal(size=(60, 30)).astype(np.float32)
+    persons = np.repeat([0, 1], 30)
+    return LipModel(
+        name="GR-eva",
+        estimator=KernelRegressor(0.1, 0.3).fit(
+            features, targets, persons, persons=persons, n_layers=18
+        ),
+        feature_names=NAMES,
+        feature_columns=np.array([0, 2, 3]),
+        mask=MASK,
+        topology=topology_hash(TRIANGLES),
+        training_frames={"zoe/rom": np.arange(30), "ana/rom": np.arange(30)},
+        vertices=VERTICES,
+        neutrals_mm={"zoe": shape(1), "ana": shape(2)},
+    )
+
+
+@pytest.fixture
+def pair():
+    coarse = shape(3)
+    return NeutralPair(
+        "eva", coarse, coarse + shape(4) / 15, np.array([0.2, 9.0, -0.1, 0.4]), np.array(NAMES),
+        shape(5),
+    )  # fmt: skip
+
+
+def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
+    known = acquainted(model, pair, TRIANGLES)
+    layers = known.predict(pair.features[None], pair.neutral_mm)[0]
+    true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
+    np.testing.assert_allclose(layers, true, atol=1e-5)
+    moved = known.displacements_mm(pair.features[None], pair.neutral_mm)[0]
+    np.testing.assert_allclose(moved, (pair.accurate_mm - pair.coarse_mm)[VERTICES], atol=1e-4)
+    assert np.abs(model.predict(pair.features[None], pair.neutral_mm)[0] - true).max() > 0.05
+
+
+def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
+    known = acquainted(model, pair, TRIANGLES)
+    features = np.random.default_rng(6).normal(size=(5, 4))
+    difference = known.predict(features, pair.neutral_mm) - model.predict(features)
+    np.testing.assert_allclose(difference, difference[:1].repeat(5, axis=0), atol=1e-5)
+    for other in (None, shape(1), shape(2)):
+        np.testing.assert_array_equal(
+            known.predict(features, other), model.predict(features, other)
+        )
+
+
+def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
+    accurate = pair.accurate_mm.copy()
+    accurate[4] = np.nan  # a corner of the second triangle of the mask
+    known = acquainted(model, replace(pair, accurate_mm=accurate), TRIANGLES)
+    whole = acquainted(model, pair, TRIANGLES)
+    features = pair.features[None]
+    found = known.predict(features, pair.neutral_mm)[0]
+    np.testing.assert_allclose(found[0], whole.predict(features, pair.neutral_mm)[0, 0], atol=1e-6)
+    np.testing.assert_allclose(found[1], model.predict(features)[0, 1], atol=1e-6)
+
+
+def test_a_bad_pair_and_a_person_of_the_training_change_nothing(model, pair):
+    assert acquainted(model, replace(pair, reason="the coarse track failed"), TRIANGLES) is model
+    assert acquainted(model, replace(pair, neutral_mm=shape(2)), TRIANGLES) is model
+
+
+def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
+    estimator = KernelRegressor(0.1, 0.3).fit(
+        np.random.default_rng(0).normal(size=(40, 3)),
+        np.random.default_rng(1).normal(size=(40, 30)).astype(np.float32),
+    )
+    known = acquainted(replace(model, estimator=estimator, neutrals_mm={}), pair, TRIANGLES)
+    true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
+    layers = known.predict(pair.features[None], pair.neutral_mm)[0]
+    np.testing.assert_allclose(layers, true, atol=1e-5)
+
+
+def test_other_features_are_refused_with_the_person_named(model, pair):
+    with pytest.raises(InputError, match="subject eva.*features that are not the regressor's"):
+        acquainted(model, replace(pair, feature_names=np.array(NAMES[:3])), TRIANGLES)
+
+
+def test_round_trip(pair, tmp_path):
+    pair.save(tmp_path / "pair.npz")
+    read = NeutralPair.load(tmp_path / "pair.npz")
+    assert (read.subject, read.reason) == ("eva", "")
+    np.testing.assert_array_equal(read.accurate_mm, pair.accurate_mm)
+    np.testing.assert_array_equal(read.features, pair.features)
