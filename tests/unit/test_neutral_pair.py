@@ -103,7 +103,7 @@ def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
 
 
 def test_other_features_are_refused_with_the_person_named(model, pair):
-    with pytest.raises(InputError, match="subject eva.*features that are not the regressor's"):
+    with pytest.raises(InputError, match=r"subject eva.*features that are not the regressor's"):
         acquainted(model, replace(pair, feature_names=np.array(NAMES[:3])), TRIANGLES)
 
 
