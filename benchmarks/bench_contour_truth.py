@@ -116,9 +116,10 @@ def finder(results: Path, take: str, track: LandmarkTrack, camera):
     def from_landmarks(frame, maps):
         points = track.points_px[frame]
         unit = float(interocular_px(points))
-        outer = find_outer(maps[1], loop_spline(points[LIP_OUTER], 80), unit, settings)
-        start = loop_spline(points[LIP_INNER], 80)
-        inner = find_inner(maps[0], outer.points, start, unit, settings)
+        start = loop_spline(points[LIP_OUTER], 80)
+        lips = loop_spline(points[LIP_INNER], 80) - start
+        outer = find_outer(maps[1], start, unit, settings)
+        inner = find_inner(maps[0], outer.points, lips, unit, settings)
         return Found(outer.points, inner.points, outer.found, inner.found)
 
     return from_landmarks

@@ -96,8 +96,8 @@ def contour_error_px(detector, frame: LabelledFrame) -> tuple[dict[str, float], 
     unit, settings = float(interocular_px(frame.landmarks_px)), SearchSettings()
     ring = loop_spline(frame.landmarks_px[LIP_OUTER], 80)
     outer = find_outer(outer_map, ring, unit, settings)
-    model_inner = loop_spline(frame.landmarks_px[LIP_INNER], 80)
-    inner = find_inner(inner_map, outer.points, model_inner, unit, settings)
+    lips = loop_spline(frame.landmarks_px[LIP_INNER], 80) - ring
+    inner = find_inner(inner_map, outer.points, lips, unit, settings)
     scale = 120.0 / np.ptp(frame.label.outer.points_px[:, 0])
     ends = frame.label.inner.points_px[:, 0]
     between = (inner.points[:, 0] > ends.min()) & (inner.points[:, 0] < ends.max())

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.unit.mouths import crest, draw_mouth, facing_camera, mouth_model
+from tests.unit.mouths import crest, draw_mouth, ellipse, facing_camera, mouth_model
 from vermilion.errors import InputError
 from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
-from vermilion.features.search import SearchSettings, inward_normals
+from vermilion.features.search import SearchSettings, find_inner, inward_normals
 from vermilion.features.shape_space import head_displacement, shape_space
 from vermilion.features.vector import FeatureTable, feature_names, judge
 from vermilion.mesh import vertex_areas
@@ -124,6 +124,18 @@ def test_distances_do_not_change_when_the_picture_moves_grows_or_turns(view):
     maps = ridge_maps(moved, view.get("size", (240, 240)), 1.5 * view.get("scale", 1.0))
     found = sampler(model).find(model.neutral_mm, camera, maps).distances
     np.testing.assert_allclose(found, expected, atol=0.004)
+
+
+def test_a_lip_is_as_thick_as_the_models_where_only_its_outer_contour_is_seen():
+    outer = ellipse((120.0, 150.0), 40.0, 26.0, 80)
+    model_outer, model_inner = (
+        ellipse((120.0, 150.0), width, height, 80) for width, height in ((52.0, 26.0), (40.0, 14.0))
+    )
+    nothing = np.zeros((240, 240), dtype=np.float32)
+    found = find_inner(nothing, outer, model_inner - model_outer, 200.0, SearchSettings())
+    assert not found.found.any()
+    thickness = np.linalg.norm(found.points - outer, axis=1)
+    np.testing.assert_allclose(thickness, 12.0, atol=1.5)
 
 
 def test_without_maps_or_without_maxima_the_models_contour_stands_in():

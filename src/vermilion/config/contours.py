@@ -85,7 +85,7 @@ class ContourDetectorConfig(StageConfig):
         gt=0,
         le=0.3,
         description="`landmarks`: how far from the landmarks the lips' border is looked for (per "
-        "inter-ocular distance).",
+        "inter-ocular distance; the outer one half as far again).",
     )
     edge_weight: float = Field(
         4.0,

@@ -18,13 +18,13 @@ from scipy.spatial import cKDTree
 
 from vermilion.contours.channels import image_channels
 from vermilion.contours.detector import ContourDetector
+from vermilion.contours.gums import creases, flesh_plane
 from vermilion.contours.paths import cheapest_ring
 from vermilion.contours.region import SIDE, MouthRegion
 
-STEP_PX = 0.5  # between the places along a normal, region pixels
 BLUR_PX = 1.0  # of the colours
 LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade above it allows
-CONTACT = 0.04  # a mouth open by less may be closed: per inter-ocular distance
+CONTACT = 0.03  # a mouth open by less may be closed: per inter-ocular distance
 LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
 LINE_SHARE = 0.7  # what the dark line counts there, against the fall
 
@@ -36,23 +36,45 @@ class Pass:
     Attributes:
         band: where lips are sure to be, from the outer (0) to the inner (1) border.
         tolerance: squared deviations from the lips' colour at which a colour is 63 % strange.
-        inner_reach: of the search for the inner border, per that for the outer one. A whole reach
-            starts at the landmarks, a part at the border found before.
+        outer_reach: of the search for the outer border about the last one found, per the detector's.
+        inner_reach: of the search for the inner border. A whole reach starts at the landmarks, a
+            part at the border found before.
+        step_px: between the places along a normal, region pixels.
     """
 
     band: tuple[float, float]
     tolerance: float
+    outer_reach: float
     inner_reach: float
+    step_px: float
 
 
-#: First the middle of the lips, as landmarks may miss. Then all up to the dark of the opening, but
+#: First the middle of the lips, as landmarks may miss: those of the outer border by a whole lip, where
+#: gums are taken for one. Then all up to the dark of the opening, but
 #: strictly, as gums and tongue are nearly lip-coloured. Last leniently, so that the lips' own shade
-#: beside the opening does not count as opening, close to the border that is known by then.
+#: beside the opening does not count as opening, close to the borders that are known by then.
 PASSES = (
-    Pass((0.3, 0.7), 18.0, 1.0),
-    Pass((0.5, 0.95), 18.0, 1.0),
-    Pass((0.5, 0.95), 50.0, 0.3),
+    Pass((0.3, 0.7), 18.0, 1.5, 1.0, 0.5),
+    Pass((0.5, 0.95), 18.0, 1.0, 1.0, 0.5),
+    Pass((0.5, 0.95), 50.0, 0.3, 0.3, 0.25),
 )
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What else tells the inner border: (size, size) planes.
+
+    Attributes:
+        lightness: of the picture.
+        contact: dark lines, as where lips touch.
+        flesh: where the picture is lips, gums or tongue, 0 or 1.
+        lip: 1 inside the outer border.
+    """
+
+    lightness: np.ndarray
+    contact: np.ndarray
+    flesh: np.ndarray
+    lip: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -85,41 +107,69 @@ class LandmarkRidgeDetector(ContourDetector):
         curves, strengths = dict(landmarks), {}
         for once in PASSES:
             planes = lip_planes(colours, curves, once)
-            inner = curves["inner"] if once.inner_reach < 1 else landmarks["inner"]
-            for name, start, share in (
-                ("outer", curves["outer"], 1.0),
-                ("inner", inner, once.inner_reach),
-            ):
-                curves[name], strengths[name] = self._moved(
-                    start, planes[name], share * reach, contact if name == "inner" else None
-                )
+            curves["outer"], strengths["outer"] = self._moved(
+                curves["outer"], planes["outer"], once.outer_reach * reach, once.step_px
+            )
+            lip = _filled(curves["outer"], region.size_px).astype(np.float32)
+            curves["inner"], strengths["inner"] = self._moved(
+                curves["inner"] if once.inner_reach < 1 else landmarks["inner"],
+                planes["inner"],
+                once.inner_reach * reach,
+                once.step_px,
+                Inside(colours[0], contact, planes["flesh"], lip),
+            )
         return {name: self._ridge(curves[name], strengths[name], region) for name in curves}
 
     def _moved(
-        self, curve: np.ndarray, plane: np.ndarray, reach_px: float, contact: np.ndarray | None
+        self,
+        curve: np.ndarray,
+        plane: np.ndarray,
+        reach_px: float,
+        step_px: float,
+        inside: Inside | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """The curve on the strongest fall of `plane` near it, and the fall (n,) in [0, 1].
 
-        Where the curve's halves nearly meet, lips may touch: their line of `contact` counts too.
+        The inner one (with `inside`) also where lips touch or gums begin.
         """
-        normals = _outward_normals(curve)
-        places = np.arange(-reach_px, reach_px + 1e-9, STEP_PX)
+        normals, count = _outward_normals(curve), int(reach_px / step_px)
+        places = step_px * np.arange(-count, count + 1)
         points = curve[:, None] + places[None, :, None] * normals[:, None]
-        fall = np.maximum(-np.gradient(_sampled(plane, points), STEP_PX, axis=1), 0.0)
+        fall = np.maximum(-np.gradient(_sampled(plane, points), step_px, axis=1), 0.0)
         fall = np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
-        if contact is not None:
-            near = np.exp(-((_gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))
-            line = _sampled(contact, points)
+        if inside is not None:
+            near = np.exp(-((_gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))[:, None]
+            line = _sampled(inside.contact, points)
             line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
-            fall += LINE_SHARE * near[:, None] * (line - fall)
+            fall += LINE_SHARE * near * (line - fall)
+            crease, beyond = self._creases(curve, normals, inside, step_px, count)
+            fall += (1.0 - near) * (crease - beyond * fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
         apart = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
-        chosen = cheapest_ring(cost, self.stiffness * (STEP_PX / np.maximum(apart, STEP_PX)) ** 2)
+        chosen = cheapest_ring(cost, self.stiffness * (step_px / np.maximum(apart, step_px)) ** 2)
         rows = np.arange(len(curve))
         moved = curve + places[chosen][:, None] * normals
         for _ in range(2):
             moved = 0.25 * np.roll(moved, 1, axis=0) + 0.5 * moved + 0.25 * np.roll(moved, -1, 0)
-        return moved, fall[rows, chosen]
+        return moved, np.minimum(fall[rows, chosen], 1.0)
+
+    def _creases(
+        self, curve: np.ndarray, normals: np.ndarray, inside: Inside, step_px: float, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`creases` at so many steps to either side of a curve.
+
+        They are looked for from one reach inside it to two outside it, as the landmarks may lie on the
+        far border of the gums.
+        """
+        reach = int(self.reach * self.interocular_size_px / step_px)
+        places = step_px * np.arange(-reach, 2 * reach + 1)
+        points = curve[:, None] + places[None, :, None] * normals[:, None]
+        lightness, flesh, lip = (
+            _sampled(plane, points) for plane in (inside.lightness, inside.flesh, inside.lip)
+        )
+        found = creases(lightness, flesh > 0.5, lip > 0.5, step_px)
+        crease, beyond = (values[:, reach - count : reach + count + 1] for values in found)
+        return crease, beyond
 
     def _ridge(self, curve: np.ndarray, strength: np.ndarray, region: MouthRegion) -> np.ndarray:
         dense = np.concatenate([curve + t * (np.roll(curve, -1, 0) - curve) for t in (0.0, 0.5)])
@@ -150,7 +200,7 @@ class LandmarkRidgeDetector(ContourDetector):
 def lip_planes(
     colours: np.ndarray, curves: dict[str, np.ndarray], once: Pass
 ) -> dict[str, np.ndarray]:
-    """Two (size, size) float32 planes in [0, 1] that fall outwards across each contour.
+    """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
 
     `outer`: probability of lip against skin, of two normal distributions with one covariance
     (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
@@ -165,7 +215,7 @@ def lip_planes(
     scale = size / SIDE
     skin = ~inside & (to_outer > 0.05 * scale) & (to_outer < 0.12 * scale)
     if lip.sum() < 20 or skin.sum() < 20:
-        return {name: np.zeros_like(colours[0]) for name in ("inner", "outer")}
+        return {name: np.zeros_like(colours[0]) for name in ("inner", "outer", "flesh")}
     lips, skins = colours[:, lip].T.astype(np.float64), colours[:, skin].T.astype(np.float64)
     own = _covariance(lips)
     shared = 0.5 * (own + _covariance(skins))
@@ -178,6 +228,7 @@ def lip_planes(
     return {
         "outer": (1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))).astype(np.float32),
         "inner": (1.0 - np.exp(-squared / once.tolerance)).astype(np.float32),
+        "flesh": flesh_plane(colours, lip),
     }
 
 
@@ -230,11 +281,17 @@ def _outward_normals(curve: np.ndarray) -> np.ndarray:
 
 def _drawn(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Inside of a closed curve (size, size) bool, and the distance to it to a pixel."""
-    points = [np.rint(curve - 0.5).astype(np.int32)]
-    inside, away = np.zeros((size, size), dtype=np.uint8), np.ones((size, size), dtype=np.uint8)
-    cv2.fillPoly(inside, points, 1)
-    cv2.polylines(away, points, True, 0)
-    return inside > 0, cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    away = np.ones((size, size), dtype=np.uint8)
+    cv2.polylines(away, [np.rint(curve - 0.5).astype(np.int32)], True, 0)
+    distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return _filled(curve, size), distance
+
+
+def _filled(curve: np.ndarray, size: int) -> np.ndarray:
+    """Inside of a closed curve (size, size) bool."""
+    inside = np.zeros((size, size), dtype=np.uint8)
+    cv2.fillPoly(inside, [np.rint(curve - 0.5).astype(np.int32)], 1)
+    return inside > 0
 
 
 def _covariance(samples: np.ndarray) -> np.ndarray:

@@ -94,7 +94,9 @@ class ContourSampler:
         if maps is not None:
             found = find_outer(maps[1], outer, unit, self.settings, to_pixels)
             outer, outer_found = found.points, found.found
-            found = find_inner(maps[0], outer, inner, unit, self.settings, to_pixels)
+            found = find_inner(
+                maps[0], outer, model_inner - model_outer, unit, self.settings, to_pixels
+            )
             inner, inner_found = found.points, found.found
         return FrameContours(
             contour_distances(outer, inner, unit),

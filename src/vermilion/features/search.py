@@ -126,7 +126,7 @@ def find_outer(
 def find_inner(
     likelihood: np.ndarray,
     outer: np.ndarray,
-    model_inner: np.ndarray,
+    lips: np.ndarray,
     unit: float,
     settings: SearchSettings,
     to_pixels: Callable[[np.ndarray], np.ndarray] = np.asarray,
@@ -141,16 +141,18 @@ def find_inner(
     Args:
         likelihood: (h, w) in [0, 1].
         outer: (n, 2) px or (n, 3) mm, found outer contour.
-        model_inner: as `outer`, samples of the model's inner contour.
+        lips: as `outer`, from the samples of the model's outer contour to those of its inner one: where
+            the outer contour is known, the model says how thick the lips are, not where.
         unit: inter-ocular distance, as the rings.
         settings: of the search.
         to_pixels: points (..., 3) of a ring in the head frame to pixels (..., 2).
     """
     normals = inward_normals(smoothed_ring(outer, 4))
     places = np.arange(0.0, settings.depth + 1e-9, settings.step)
-    expected = np.einsum("nk,nk->n", model_inner - outer, normals) / unit
+    expected = np.einsum("nk,nk->n", lips, normals) / unit
     expected = np.clip(smoothed_ring(expected, 2), 0.0, settings.depth)
     lines, depth = outer[:, None] + places[:, None] * unit * normals[:, None], arch_depth(outer)
+    model_inner = outer + lips
     from_outer, from_inner = outer[:, 2:] - depth(outer), model_inner[:, 2:] - depth(model_inner)
     passed = np.minimum(places / np.maximum(expected, settings.step)[:, None], 1.0)[..., None]
     lines[..., 2:] = (
