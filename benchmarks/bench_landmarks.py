@@ -11,7 +11,8 @@ many as Mono13's table 1 has a sequence. The detector and a modeller name differ
 are two truths:
 
 - `material`: the points of the true surface that the detector marked in the first frame, followed
-  through the true motion. No frame is marked by hand.
+  through the true motion. No frame is marked by hand. Where lips are closed there, a point of the
+  inner contour may lie on the other lip: such are left out.
 - `marked`: the model's landmark vertices. The first frame is marked by hand, that is, given to the
   correction; raw is raw.
 
@@ -39,7 +40,16 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import find_key_frames, without_offset
 from vermilion.landmarks.networks import NetworkDetector
-from vermilion.landmarks.scheme import BROWS, JAW, MOUTH, N_LANDMARKS, NOSE, interocular_px
+from vermilion.landmarks.scheme import (
+    BROWS,
+    JAW,
+    LIP_INNER_OPEN,
+    MOUTH,
+    N_LANDMARKS,
+    NOSE,
+    interocular_px,
+)
+from vermilion.landmarks.settle import settle
 from vermilion.raycast import RayCaster
 from vermilion.tracking.expression import fit_motion
 from vermilion.tracking.observation import Observations, focal_px
@@ -83,6 +93,17 @@ def material_points(
     )
     places[:, ~known] = np.nan
     return places + (points_px - places[0])
+
+
+def on_other_lip(material_px: np.ndarray, marked_px: np.ndarray) -> np.ndarray:
+    """Points of the inner contour that go with the other lip as it opens, of (F, 66, 2) twice."""
+    facing = LIP_INNER_OPEN[::-1]
+    own, other = marked_px[:, LIP_INNER_OPEN], marked_px[:, facing]
+    widest = np.linalg.norm(own - other, axis=2).argmax(axis=0)
+    each = np.arange(len(facing))
+    place = material_px[:, LIP_INNER_OPEN]
+    near, far = (np.linalg.norm(place - lip, axis=2)[widest, each] for lip in (own, other))
+    return LIP_INNER_OPEN[near > far]
 
 
 def expressive(true_px: np.ndarray) -> np.ndarray:
@@ -132,6 +153,7 @@ def main(results: str, name: str, places: dict[str, str], changes: dict[str, flo
     skin = triangles[~hidden[: frames_mm.shape[1]][triangles].any(axis=1)]
     marked = np.stack([camera.project(frame[studio.landmarks]) for frame in frames_mm])
     material = material_points(detected.points_px[0], camera, skin, frames_mm)
+    material[:, on_other_lip(material, marked)] = np.nan
     frames = expressive(marked)
     settings = CorrectionSettings(**changes)
     print(f"{name}: {len(frames_mm)} frames, inter-ocular {interocular_px(marked[0]):.0f} px")
@@ -143,7 +165,8 @@ def main(results: str, name: str, places: dict[str, str], changes: dict[str, flo
         ("marked", marked, {first: marked[0]}),
     ):
         start = time.process_time()
-        keys = find_key_frames(grey, without_offset(detected, given), given)
+        unbiased = without_offset(detected, given)
+        keys = settle(grey, unbiased, find_key_frames(grey, unbiased, given), settings)
         chosen = time.process_time()
         track, _ = correct(grey, detected, keys, detected.frames, settings)
         done = time.process_time()

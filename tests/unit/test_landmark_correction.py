@@ -10,6 +10,7 @@ from vermilion.images import linear_to_srgb
 from vermilion.landmarks.correction import FILLED, CorrectionSettings, correct, flow_points
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import BETWEEN, GIVEN, NEUTRAL, KeyFrames, find_key_frames
+from vermilion.landmarks.settle import settle
 
 N_FRAMES, STEP_PX = 7, np.array([1.5, -0.75])
 SETTINGS = CorrectionSettings(face_px=120.0)
@@ -143,6 +144,44 @@ def test_key_frames_survive_a_file(clip, tmp_path):
     assert list(back.frames) == [0] and list(back.kinds) == [NEUTRAL]
     assert keys.region_distance[0] == 0 and (keys.region_distance[1:] > 0).all()
     assert np.array_equal(back.points_px, keys.points_px)
+
+
+@pytest.mark.parametrize("last", [NEUTRAL, BETWEEN])
+def test_a_wrong_key_frame_inside_a_clip_ends_near_the_truth(clip, last):
+    greys, truth = clip
+    track = detected(truth, noise_px=0.0)
+    track.points_px[3] += 10.0  # where the patches misled; with `last` between, one way only
+    keys = key_frames(track.points_px, [0, 3, N_FRAMES - 1], [NEUTRAL, BETWEEN, last])
+    settled = settle(reader(greys), track, keys, SETTINGS)
+    error_px = np.linalg.norm(settled.points_px[1] - truth[3], axis=-1)
+    wrong_px = np.hypot(10, 10)
+    assert error_px[48:59].mean() < 0.15 * wrong_px  # lambda 0.1
+    assert np.array_equal(settled.points_px[0], keys.points_px[0])
+    before, _ = correct(reader(greys), track, keys, [2, 4], SETTINGS)
+    after, _ = correct(reader(greys), track, settled, [2, 4], SETTINGS)
+    mouth_px = [
+        np.linalg.norm(t.points_px - truth[[2, 4]], axis=-1)[:, 48:59].mean()
+        for t in (before, after)
+    ]
+    assert mouth_px[1] < 0.2 * mouth_px[0]
+
+
+def test_given_and_neutral_key_frames_are_not_settled(clip):
+    greys, truth = clip
+    track = detected(truth)
+    keys = key_frames(track.points_px, [0, 3, 5], [GIVEN, NEUTRAL, NEUTRAL])
+    assert settle(reader(greys), track, keys, SETTINGS) is keys
+
+
+def test_where_flow_is_lost_the_detector_settles(clip):
+    greys, truth = clip
+    rng = np.random.default_rng(5)
+    others = [rng.uniform(size=grey.shape).astype(np.float32) for grey in greys]
+    track = detected(truth, noise_px=0.0)
+    keys = key_frames(track.points_px, [0, 6], [NEUTRAL, BETWEEN])
+    lost = settle(reader(others), track, keys, CorrectionSettings(face_px=120.0, mouth=0.5))
+    moved_px = np.linalg.norm(lost.points_px[1] - truth[6], axis=-1)
+    assert np.median(moved_px) < 2.0
 
 
 def test_a_take_without_a_face_stays_as_it_is(clip):

@@ -158,7 +158,7 @@ if CONFIG.landmarks.correction.mode == "flow":
             mem_mb=1000,
             runtime=60,
         params:
-            cfg=cfg_of("landmarks.key_frames"),
+            cfg=cfg_of("landmarks.key_frames", "landmarks.correction"),
             code=code_of("landmarks_key_frames"),
             source=mono_sources,
             camera=mono_camera,

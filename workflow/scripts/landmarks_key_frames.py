@@ -1,10 +1,12 @@
-"""Key frames of a take: given ones, and those chosen by local binary patterns."""
+"""Key frames of a take: given ones, and those chosen by local binary patterns, settled by flow."""
 
 from vermilion.frames import open_frames
+from vermilion.landmarks.correction import CorrectionSettings
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
 from vermilion.landmarks.labels import labels_by_frame
+from vermilion.landmarks.settle import settle
 from vermilion.landmarks.table import read_landmark_csv
 from vermilion.logfile import log_to
 from vermilion.tables import write_table
@@ -22,12 +24,16 @@ def main(snakemake):
         found = read_landmark_csv(path, **settings).by_frame
         given |= {frame: entry.points_px for frame, entry in found.items()}
     given |= labels_by_frame(snakemake.input.labels)  # a person is right where both speak
+    track = without_offset(track, given)
+
+    def read_grey(frame):
+        return grey_of(source.read(camera, frame))
+
     keys = find_key_frames(
-        lambda frame: grey_of(source.read(camera, frame)),
-        without_offset(track, given),
-        given,
-        settings=KeyFrameSettings(cfg["share"], cfg["max_clip"]),
+        read_grey, track, given, settings=KeyFrameSettings(cfg["share"], cfg["max_clip"])
     )
+    correction = snakemake.params.cfg["landmarks.correction"]
+    keys = settle(read_grey, track, keys, CorrectionSettings.of(correction))
     print(f"{len(keys.frames)} key frames of {len(track.frames)} frames")
     write_table(snakemake.output.table, keys.table())
     keys.save(snakemake.output.key_frames)

@@ -123,8 +123,8 @@ class LandmarkCorrectionConfig(StageConfig):
         0.5,
         ge=0,
         le=1,
-        description="Weight of the detector at the inner lip contour, where flow stays on teeth "
-        "(0.1: as the rest of the mouth, Mono13).",
+        description="Weight of the detector at the inner lip contour, an outline, which flow follows "
+        "by the lip beside it (0.1: as the rest of the mouth, Mono13).",
     )
     eyes: float = Field(0.5, ge=0, le=1, description="Weight of the detector at the eyes.")
     jaw: float = Field(0.2, ge=0, le=1, description="Weight of the detector along the jaw.")

@@ -12,12 +12,12 @@ from vermilion.errors import InputError
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.flow import FaceFlow, carry_along
 from vermilion.landmarks.key_frames import KeyFrames, without_offset
+from vermilion.landmarks.lip_side import off_lips, onto_lips
 from vermilion.landmarks.scheme import (
     EYE_LEFT,
     EYE_RIGHT,
     JAW,
-    LIP_INNER,
-    LIP_OUTER,
+    LIP_INNER_OPEN,
     MOUTH,
     N_LANDMARKS,
     face_size_px,
@@ -34,8 +34,8 @@ class CorrectionSettings:
 
     Attributes:
         mouth, eyes, jaw, rest: weight of the detected point, lambda of Mono13 eq. 4.
-        inner_lips: the same of the inner contour between the corners. It is an outline: as the
-            mouth opens, flow stays on the teeth, and leads back from there too.
+        inner_lips: the same of the inner contour between the corners. It is an outline, which
+            flow follows by the lip beside it, see `lip_side`.
         face_px: size of the face where flow is computed, see `FaceFlow`.
         tolerance: share of the face's size that flow may fail to lead back by, summed over the
             frames from the key frame, where its weight is halved.
@@ -60,7 +60,7 @@ class CorrectionSettings:
         """Weights (66,) of the detected points."""
         weights = np.full(N_LANDMARKS, self.rest)
         weights[JAW], weights[MOUTH] = self.jaw, self.mouth
-        weights[np.setdiff1d(LIP_INNER, LIP_OUTER)] = self.inner_lips
+        weights[LIP_INNER_OPEN] = self.inner_lips
         weights[np.concatenate([EYE_RIGHT, EYE_LEFT])] = self.eyes
         return weights
 
@@ -147,24 +147,44 @@ def _clip_points(read_grey, frames, span, shapes, ends, settings):
     points = np.full((len(span), N_LANDMARKS, 2), np.nan)
     confidence = np.zeros(points.shape[:2])
     at = np.isin(span, read)
-    tolerance = settings.tolerance * face_size_px(shapes[read])[:, None]
     paths = []
     if ends[0] is not None:
-        paths.append(carry_along(flows, ends[0]))
+        paths.append(carry_along(flows, onto_lips(ends[0])))
     if ends[1] is not None:
-        back = carry_along([flow.reversed() for flow in flows[::-1]], ends[1])
+        back = carry_along([flow.reversed() for flow in flows[::-1]], onto_lips(ends[1]))
         paths.append((back[0][::-1], back[1][::-1]))
-    trust = [1 / (1 + (astray / tolerance) ** 2) for _, astray in paths]
-    if len(paths) == 1:
-        points[at], confidence[at] = paths[0][0], trust[0]
-        return points, confidence
-    progress_ = (np.asarray(read) - span[0]) / (span[-1] - span[0])
-    later = (0.5 - 0.5 * np.cos(np.pi * progress_))[:, None]
-    weights = np.stack([(1 - later) * trust[0], later * trust[1]])
-    confidence[at] = weights.sum(axis=0)
-    weights = (weights / np.maximum(weights.sum(axis=0), 1e-12))[..., None]
-    points[at] = weights[0] * paths[0][0] + weights[1] * paths[1][0]
+    ways = [(off_lips(path), trust(astray, shapes[read], settings)) for path, astray in paths]
+    later = (np.asarray(read) - span[0]) / (span[-1] - span[0]) if len(ways) == 2 else None
+    points[at], confidence[at] = join(ways, later)
     return points, confidence
+
+
+def trust(astray_px: np.ndarray, shapes: np.ndarray, settings: CorrectionSettings) -> np.ndarray:
+    """How sure flow is, (..., 66) in [0, 1], that has not led back by (..., 66) px.
+
+    Args:
+        shapes: (..., 66, 2) px, about where the face is.
+    """
+    tolerance = settings.tolerance * face_size_px(shapes)[..., None]
+    return 1 / (1 + (astray_px / tolerance) ** 2)
+
+
+def join(
+    ways: Sequence[tuple[np.ndarray, np.ndarray]], later: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 66, 2) and confidence (n, 66) of flow from the key frame before and the one after.
+
+    Args:
+        ways: points and trust of each of the one or two flows.
+        later: (n,) in [0, 1], how far a frame is from the first key frame to the second.
+    """
+    if len(ways) == 1:
+        return ways[0]
+    share = (0.5 - 0.5 * np.cos(np.pi * later))[:, None]
+    weights = np.stack([(1 - share) * ways[0][1], share * ways[1][1]])
+    confidence = weights.sum(axis=0)
+    weights = (weights / np.maximum(confidence, 1e-12))[..., None]
+    return weights[0] * ways[0][0] + weights[1] * ways[1][0], confidence
 
 
 def blend(

@@ -16,6 +16,8 @@ EYE_RIGHT = np.arange(36, 42)  # the subject's right eye, on the left of the pic
 EYE_LEFT = np.arange(42, 48)
 LIP_OUTER = np.array([58, 48, 49, 50, 51, 52, 62, 53, 54, 55, 56, 57])  # closed loop
 LIP_INNER = np.arange(58, 66)  # closed loop; 58 and 62 are the mouth corners
+LIP_INNER_OPEN = np.array([59, 60, 61, 63, 64, 65])  # the inner contour but for the corners
+LIP_OUTER_FACING = np.array([49, 50, 51, 54, 55, 56])  # across the lip from each of these
 MOUTH = np.arange(48, 66)
 EYE_CORNERS = np.array([36, 45])  # the outer corners
 
