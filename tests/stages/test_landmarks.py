@@ -150,13 +150,18 @@ def moving(stage, tmp_path_factory):
     return root, truth, label
 
 
+def correction_settings():
+    """What the default says of correction, for small pictures."""
+    return {"landmarks.correction": section()["correction"] | {"face_px": 100.0}}
+
+
 def key_frames_of(root, **inputs):
     """Run the stage; the table of key frames."""
     run_script(
         "landmarks_key_frames",
         wildcards={"subject": "a", "take": "t"},
         params={
-            "cfg": {"landmarks.key_frames": section()["key_frames"]},
+            "cfg": {"landmarks.key_frames": section()["key_frames"]} | correction_settings(),
             "source": str(root / "take"),
             "camera": "cam",
         },
@@ -171,7 +176,7 @@ def corrected_of(root, frames):
         "landmarks_corrected",
         wildcards={"subject": "a", "take": "t"},
         params={
-            "cfg": {"landmarks.correction": section()["correction"] | {"face_px": 100.0}},
+            "cfg": correction_settings(),
             "source": str(root / "take"),
             "camera": "cam",
             "frames": frames,
