@@ -110,6 +110,13 @@ def test_a_person_is_known_again_by_their_neutral(model):
     assert not np.allclose(model.predict(features, neutral(1)), model.predict(features, neutral(2)))
 
 
+def test_a_file_with_people_who_have_no_bias_says_so(model, tmp_path):
+    more = replace(model, neutrals_mm={"abe": neutral(3)} | model.neutrals_mm)
+    save_model(tmp_path / "MS.h5", more)
+    with pytest.raises(ModelFileError, match=r"3 people \(abe, zoe, ana\) with 2 biases"):
+        load_model(tmp_path / "MS.h5")
+
+
 def test_novelty_grows_away_from_the_training(model):
     near = np.zeros((1, 4))
     assert model.novelty(near + 100)[0] > 10 * model.novelty(near)[0]

@@ -76,6 +76,7 @@ def test_no_regressor_trains_on_what_it_is_judged_by(sheet, tmp_path_factory):
                 (data.takes[k], int(f)) for k, f in zip(data.sequences, data.frames, strict=True)
             }
             assert seen == wanted
+            assert tuple(data.neutrals_mm) == data.subjects  # a bias is found by its place
             for take in takes:
                 assert not seen & {(take.name, f) for f in take.test_frames()}
             if name.startswith("GR-"):

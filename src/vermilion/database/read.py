@@ -120,5 +120,6 @@ class LipDatabase:
                 frames[to] = group["frames"][part]
             first += len(part)
         names = tuple(f"{s}/{t}" for s, t in chosen)
-        neutrals = {s: self.neutral_mm(s) for s in sorted({s for s, _ in chosen})}
+        trained = {s for (s, _), part in zip(chosen, rows, strict=True) if len(part)}
+        neutrals = {s: self.neutral_mm(s) for s in sorted(trained)}
         return TrainingSet(features, layers, displacements, sequences, names, frames, neutrals)

@@ -74,7 +74,7 @@ class TrainingSet:
         sequences: (F,) int index into `takes`.
         takes: names `subject/take`.
         frames: (F,) int32 frame numbers.
-        neutrals_mm: subject -> (V, 3) coarse neutral.
+        neutrals_mm: subject -> (V, 3) coarse neutral, in the order of `subjects`.
     """
 
     features: np.ndarray

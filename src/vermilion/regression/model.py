@@ -175,7 +175,7 @@ def load_model(path: str | Path) -> LipModel:
     try:
         with h5py.File(path, "r") as file:
             _check_header(file, path)
-            return _read(file)
+            model = _read(file)
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         raise ModelFileError(
             f"a truncated or damaged model file ({error})",
@@ -183,6 +183,15 @@ def load_model(path: str | Path) -> LipModel:
             "Copy it again, or remove it and run again.",
             path=path,
         ) from error
+    people, biases = len(model.neutrals_mm), len(model.estimator.person_biases_)
+    if people and people != biases:
+        raise ModelFileError(
+            f"{people} people ({', '.join(model.neutrals_mm)}) with {biases} biases",
+            "one bias a person; an older Vermilion named people without training frames too",
+            "Train the regressor again with this version.",
+            path=path,
+        )
+    return model
 
 
 def _check_header(file: h5py.File, path: str | Path) -> None:
