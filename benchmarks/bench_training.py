@@ -45,6 +45,7 @@ def paper_sized_data() -> TrainingSet:
         names,
         np.arange(N_FRAMES),
         neutrals,
+        {},
     )
 
 

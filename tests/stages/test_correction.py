@@ -37,6 +37,7 @@ def scene(tmp_path_factory):
         run_correspondence(root, subject)
         for chunk in CHUNKS:
             run_layers(root, subject, chunk)
+        run_neutral_pair(root, subject)
     run_database(root)
     for regressor in ("PS-ana", "MS", "GR-ana", "MS-affine", "MS-shape-only"):
         run_train(root, regressor)
@@ -93,6 +94,28 @@ def run_layers(root, subject, chunk):
     )
 
 
+def run_neutral_pair(root, subject):
+    person, take = root / f"subjects/{subject}", root / f"takes/{subject}/rom"
+    run_script(
+        "neutral_pair",
+        wildcards={"subject": subject},
+        params={
+            "cfg": {"correction.layers": LayersConfig().model_dump()}, "take": "rom", "first": 0,
+        },
+        input={
+            "template": root / "face/template.npz",
+            "tracker": root / "face/tracker.npz",
+            "accurate": take / "multiview/neutral.npz",
+            "coarse": take / f"tracking/C/{CHUNKS[0]}.npy",
+            "fit": take / "tracking/fit.npz",
+            "features": take / f"correction/features/{CHUNKS[0]}.npz",
+            "correspondence": person / "correspondence.npz",
+            "identity": person / "identity.npz",
+        },
+        output={"pair": person / "neutral_pair.npz", "overlay": person / "neutral_pair.png"},
+    )  # fmt: skip
+
+
 def run_database(root):
     chunk_files = [root / f"takes/{s}/rom/correction" for s in SUBJECTS]
     run_script(
@@ -117,6 +140,7 @@ def run_database(root):
             "features": [f / f"features/{c}.npz" for f in chunk_files for c in CHUNKS],
             "correspondence": [root / f"subjects/{s}/correspondence.npz" for s in SUBJECTS],
             "identity": [root / f"subjects/{s}/identity.npz" for s in SUBJECTS],
+            "neutral_pair": [root / f"subjects/{s}/neutral_pair.npz" for s in SUBJECTS],
         },
         output={"database": root / "database/lips.h5"},
     )

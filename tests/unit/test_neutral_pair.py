@@ -42,6 +42,8 @@ def model():
         training_frames={"zoe/rom": np.arange(30), "ana/rom": np.arange(30)},
         vertices=VERTICES,
         neutrals_mm={"zoe": shape(1), "ana": shape(2)},
+        shifts=np.array([[0.3, 0.0, -0.2, 0.1], [-0.3, 0.0, 0.2, -0.1]]),
+        neutral_features=np.array([0.1, 0.2, 0.3, 0.4]),
     )
 
 
@@ -67,12 +69,21 @@ def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
 def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
     known = acquainted(model, pair, TRIANGLES)
     features = np.random.default_rng(6).normal(size=(5, 4))
-    difference = known.predict(features, pair.neutral_mm) - model.predict(features)
+    of_a_stranger = features - pair.features + model.neutral_features
+    difference = known.predict(features, pair.neutral_mm) - model.predict(of_a_stranger)
     np.testing.assert_allclose(difference, difference[:1].repeat(5, axis=0), atol=1e-5)
     for other in (None, shape(1), shape(2)):
         np.testing.assert_array_equal(
             known.predict(features, other), model.predict(features, other)
         )
+
+
+def test_what_all_their_frames_have_in_common_changes_nothing(model, pair):
+    features, off = np.random.default_rng(6).normal(size=(5, 4)), np.array([0.4, -0.2, 0.8, 1.5])
+    known = acquainted(model, pair, TRIANGLES).predict(features, pair.neutral_mm)
+    pair = replace(pair, features=pair.features + off)
+    again = acquainted(model, pair, TRIANGLES).predict(features + off, pair.neutral_mm)
+    np.testing.assert_allclose(again, known, atol=1e-6)
 
 
 def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
@@ -83,7 +94,8 @@ def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
     features = pair.features[None]
     found = known.predict(features, pair.neutral_mm)[0]
     np.testing.assert_allclose(found[0], whole.predict(features, pair.neutral_mm)[0, 0], atol=1e-6)
-    np.testing.assert_allclose(found[1], model.predict(features)[0, 1], atol=1e-6)
+    stranger = model.predict(model.neutral_features[None])
+    np.testing.assert_allclose(found[1], stranger[0, 1], atol=1e-6)
 
 
 def test_a_bad_pair_and_a_person_of_the_training_change_nothing(model, pair):
@@ -96,7 +108,8 @@ def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
         np.random.default_rng(0).normal(size=(40, 3)),
         np.random.default_rng(1).normal(size=(40, 30)).astype(np.float32),
     )
-    known = acquainted(replace(model, estimator=estimator, neutrals_mm={}), pair, TRIANGLES)
+    one = replace(model, estimator=estimator, neutrals_mm={}, shifts=np.zeros((0, 0)))
+    known = acquainted(one, pair, TRIANGLES)
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     np.testing.assert_allclose(layers, true, atol=1e-5)

@@ -71,7 +71,7 @@ def main(snakemake):
     write_sequence(out.corrected, corrected)
 
     novelty = np.full(len(frames), np.nan)
-    novelty[has_features] = model.novelty(features[has_features])
+    novelty[has_features] = model.novelty(features[has_features], identity.neutral_mm)
     moved = np.linalg.norm(corrected - coarse, axis=2).max(axis=1)
     rows_of_quality = [
         quality_row(

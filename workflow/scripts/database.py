@@ -1,6 +1,7 @@
 """The training database from the layers and features of every take."""
 
 from vermilion.config.database import DatabaseConfig
+from vermilion.correction.neutral_pair import NeutralPair
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.database.gather import read_take_files
 from vermilion.database.schema import SubjectEntry
@@ -14,10 +15,10 @@ def main(snakemake):
     inputs, params = snakemake.input, snakemake.params
     cfg = DatabaseConfig(**params.cfg["database"])
     maps = dict(zip(params.subjects, map(Correspondence.load, inputs.correspondence), strict=True))
-    people = map(Identity.load, inputs.identity)
+    people, pairs = map(Identity.load, inputs.identity), map(NeutralPair.load, inputs.neutral_pair)
     entries = [
-        SubjectEntry(name, person.neutral_mm, found.mask)
-        for (name, found), person in zip(maps.items(), people, strict=True)
+        SubjectEntry(name, person.neutral_mm, found.mask, None if pair.reason else pair.features)
+        for (name, found), person, pair in zip(maps.items(), people, pairs, strict=True)
     ]
     layers, features = iter(inputs.layers), iter(inputs.features)
     files = [

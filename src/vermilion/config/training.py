@@ -114,6 +114,12 @@ class TrainingConfig(StageConfig):
         "identity in the layers, and is used again where the same person is corrected. `shared`: one "
         "bias, as in the paper.",
     )
+    anchor: Literal["neutral", "none"] = Field(
+        "neutral",
+        description="What features are measured from. `neutral`: those of a person's neutral frame, of "
+        "all whose neutral is known (in the training, or by a rig take of their own). `none`: features "
+        "as they are, as in the paper. With `bias: shared` always the latter.",
+    )
     novelty_quantile: float = Field(
         0.99,
         gt=0.0,

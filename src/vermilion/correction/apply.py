@@ -45,7 +45,7 @@ class Corrector:
         smooth_frames: int = 0,
     ):
         model.check_topology(triangles)
-        self.model, self.smooth_frames = model, smooth_frames
+        self.model, self.neutral_mm, self.smooth_frames = model, neutral_mm, smooth_frames
         detail_mm = detail_mm if len(model.vertices) else 0.0
         self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm, detail_mm)
         layers, displacements_mm = model.basis(np.asarray(neutral_mm, dtype=np.float64))
@@ -60,7 +60,8 @@ class Corrector:
         `frames` (F,) are their numbers, ascending; None: they follow each other.
         """
         frames = np.arange(len(features)) if frames is None else frames
-        mixture = smoothed_over_time(self.model.mixture(features), frames, self.smooth_frames)
+        mixture = self.model.mixture(features, self.neutral_mm)
+        mixture = smoothed_over_time(mixture, frames, self.smooth_frames)
         one = np.ones((len(mixture), 1))
         return self.integrator.integrate_mixture(
             coarse_mm, np.concatenate([mixture, one], axis=1), self._basis, self._places

@@ -57,8 +57,9 @@ class NeutralPair:
 def acquainted(model: LipModel, pair: NeutralPair, triangles: np.ndarray) -> LipModel:
     """The model with the person of a pair among those whom it knows.
 
-    Their bias is such that the neutral frame is corrected to the accurate neutral; outputs where H
-    is absent keep a stranger's. The model itself where it was trained on the person, or where the
+    Their features are taken from those of the neutral frame, as in the training. Their bias is such
+    that the neutral frame is corrected to the accurate neutral; outputs where H is absent keep a
+    stranger's. The model itself where it was trained on the person, or where the
     pair is not to be used.
 
     Args:
@@ -75,16 +76,17 @@ def acquainted(model: LipModel, pair: NeutralPair, triangles: np.ndarray) -> Lip
         )
     model.check_topology(triangles)
     target = _target(model, pair, triangles)
-    known = target - model.estimator.mixture(pair.features[None, model.feature_columns])[0] @ (
-        model.estimator.basis_
-    )
+    shift = pair.features - model.neutral_features if len(model.shifts) else 0.0
+    seen = (pair.features - shift)[None, model.feature_columns]
+    known = target - model.estimator.mixture(seen)[0] @ model.estimator.basis_
     stranger = model.estimator.bias_of(None)
     estimator = copy.copy(model.estimator)
     biases = model.estimator.person_biases_[: len(model.neutrals_mm)]
     bias = np.where(np.isfinite(known), known, stranger).astype(stranger.dtype)
     estimator.person_biases_ = np.concatenate([biases, bias[None]])
     neutrals = {**model.neutrals_mm, pair.subject: pair.neutral_mm}
-    return replace(model, estimator=estimator, neutrals_mm=neutrals)
+    shifts = np.concatenate([model.shifts, shift[None]]) if len(model.shifts) else model.shifts
+    return replace(model, estimator=estimator, neutrals_mm=neutrals, shifts=shifts)
 
 
 def _target(model: LipModel, pair: NeutralPair, triangles: np.ndarray) -> np.ndarray:

@@ -69,6 +69,11 @@ class LipDatabase:
         """(V, 3) coarse neutral of a subject in the head frame."""
         return self._file[f"subjects/{subject}/neutral_mm"][:]
 
+    def neutral_features(self, subject: str) -> np.ndarray | None:
+        """(M,) features of a subject's neutral frame; None where it has none."""
+        found = self._file[f"subjects/{subject}"].get("neutral_features")
+        return None if found is None else found[:]
+
     def read_take(self, subject: str, take: str) -> TakeEntry:
         """All frames of a take."""
         group = self._file[f"takes/{subject}/{take}"]
@@ -122,4 +127,8 @@ class LipDatabase:
         names = tuple(f"{s}/{t}" for s, t in chosen)
         trained = {s for (s, _), part in zip(chosen, rows, strict=True) if len(part)}
         neutrals = {s: self.neutral_mm(s) for s in sorted(trained)}
-        return TrainingSet(features, layers, displacements, sequences, names, frames, neutrals)
+        rests = {s: self.neutral_features(s) for s in sorted(trained)}
+        rests = {s: found for s, found in rests.items() if found is not None}
+        return TrainingSet(
+            features, layers, displacements, sequences, names, frames, neutrals, rests
+        )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 FORMAT = "vermilion-lip-database"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,14 @@ class SubjectEntry:
         neutral_mm: (V, 3) coarse neutral of the person in the head frame (`identity.npz`), by which
             a regressor knows them again.
         mask: (M,) ascending ids of the coarse triangles whose layers were made.
+        neutral_features: features (M',) of the person's neutral frame (`neutral_pair.npz`); None where
+            it has none.
     """
 
     subject: str
     neutral_mm: np.ndarray
     mask: np.ndarray
+    neutral_features: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,7 @@ class TrainingSet:
         takes: names `subject/take`.
         frames: (F,) int32 frame numbers.
         neutrals_mm: subject -> (V, 3) coarse neutral, in the order of `subjects`.
+        neutral_features: subject -> (M,) features of their neutral frame, of those who have any.
     """
 
     features: np.ndarray
@@ -84,6 +88,7 @@ class TrainingSet:
     takes: tuple[str, ...]
     frames: np.ndarray
     neutrals_mm: dict[str, np.ndarray]
+    neutral_features: dict[str, np.ndarray]
 
     @property
     def subjects(self) -> tuple[str, ...]:

@@ -85,6 +85,9 @@ def write_database(
         _dataset(file, "layers/names", np.array(NUMBERS, dtype="S"))
         for entry in subjects:
             _dataset(file, f"subjects/{entry.subject}/neutral_mm", entry.neutral_mm)
+            if entry.neutral_features is not None:
+                values = entry.neutral_features.astype(np.float32)
+                _dataset(file, f"subjects/{entry.subject}/neutral_features", values)
         for entry in takes:
             _write_take(file, entry, columns[entry.subject], len(feature_names), compression)
 

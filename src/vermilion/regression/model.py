@@ -17,7 +17,7 @@ from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 
 FORMAT = "vermilion-regressor"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 #: Displacement (mm) that weighs as much as 1 in a layer (rad), so that one basis serves both.
 DISPLACEMENT_UNIT_MM = 30.0
 #: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
@@ -41,6 +41,9 @@ class LipModel:
         training_frames: `subject/take` -> (n,) frame numbers trained on.
         neutrals_mm: subject -> (V, 3) coarse neutral of each person with a bias of their own, in the
             order of the biases; empty for one shared bias.
+        shifts: (G, M) what is taken off the features of each of them, so that their neutral frames
+            have the same; none for features as they are.
+        neutral_features: (M,) what all neutral frames have then: their mean in the training.
         novelty_limit: `novelty` above which a frame is outside the training's span.
         units: what the features and layers are measured in.
     """
@@ -54,6 +57,8 @@ class LipModel:
     training_frames: dict[str, np.ndarray]
     vertices: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     neutrals_mm: dict[str, np.ndarray] = field(default_factory=dict)
+    shifts: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    neutral_features: np.ndarray = field(default_factory=lambda: np.zeros(0))
     novelty_limit: float = np.inf
     units: dict[str, str] = field(
         default_factory=lambda: {
@@ -86,20 +91,21 @@ class LipModel:
                 a person of the training is used again; None for somebody else.
         """
         person = self.person_of(neutral_mm)
-        flat = self.estimator.predict(self._chosen(features), person)
+        flat = self.estimator.predict(self._chosen(features, person), person)
         return flat[:, : 9 * len(self.mask)].reshape(len(features), -1, 9)
 
     def displacements_mm(
         self, features: np.ndarray, neutral_mm: np.ndarray | None = None
     ) -> np.ndarray:
         """Displacements (F, N, 3) from C, head frame, of features (F, M); as in `predict`."""
-        flat = self.estimator.predict(self._chosen(features), self.person_of(neutral_mm))
+        person = self.person_of(neutral_mm)
+        flat = self.estimator.predict(self._chosen(features, person), person)
         places = flat[:, 9 * len(self.mask) :].reshape(len(features), -1, 3)
         return DISPLACEMENT_UNIT_MM * places
 
-    def mixture(self, features: np.ndarray) -> np.ndarray:
-        """Coefficients (F, R) of the layers' basis, of features (F, M)."""
-        return self.estimator.mixture(self._chosen(features))
+    def mixture(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
+        """Coefficients (F, R) of the layers' basis, of features (F, M); person as in `predict`."""
+        return self.estimator.mixture(self._chosen(features, self.person_of(neutral_mm)))
 
     def basis(self, neutral_mm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Layers (R + 1, T * 9) and displacements (R + 1, N * 3) mm that `mixture` mixes.
@@ -111,9 +117,9 @@ class LipModel:
         layers, places = np.split(rows, [9 * len(self.mask)], axis=1)
         return layers, DISPLACEMENT_UNIT_MM * places
 
-    def novelty(self, features: np.ndarray) -> np.ndarray:
+    def novelty(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
         """How far features (F, M) lie from what was trained on, (F,); see the estimators."""
-        return self.estimator.novelty(self._chosen(features))
+        return self.estimator.novelty(self._chosen(features, self.person_of(neutral_mm)))
 
     def check_topology(self, triangles: np.ndarray, path: str | Path | None = None) -> None:
         """Raise ModelFileError where a mesh's triangles (T, 3) are not those of the training."""
@@ -126,12 +132,14 @@ class LipModel:
                 path=path,
             )
 
-    def _chosen(self, features: np.ndarray) -> np.ndarray:
+    def _chosen(self, features: np.ndarray, person: int | None) -> np.ndarray:
         features = np.asarray(features)
         if features.ndim != 2 or features.shape[1] != len(self.feature_names):
             raise ValueError(
                 f"features must be (F, {len(self.feature_names)}), got {features.shape}"
             )
+        if person is not None and len(self.shifts):
+            features = features - self.shifts[person]
         return features[:, self.feature_columns]
 
 
@@ -162,6 +170,8 @@ def save_model(path: str | Path, model: LipModel) -> None:
         for index, (name, neutral) in enumerate(model.neutrals_mm.items()):
             _put(file, f"persons/{name}", np.asarray(neutral, dtype=np.float64))
             file[f"persons/{name}"].attrs["index"] = index
+        _put(file, "features/shifts", np.asarray(model.shifts, dtype=np.float64))
+        _put(file, "features/neutral", np.asarray(model.neutral_features, dtype=np.float64))
         for name, frames in sorted(model.training_frames.items()):
             _put(file, f"training/{name}", np.asarray(frames, dtype=np.int32))
 
@@ -175,7 +185,7 @@ def load_model(path: str | Path) -> LipModel:
     try:
         with h5py.File(path, "r") as file:
             _check_header(file, path)
-            model = _read(file)
+            return _read(file)
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         raise ModelFileError(
             f"a truncated or damaged model file ({error})",
@@ -183,15 +193,6 @@ def load_model(path: str | Path) -> LipModel:
             "Copy it again, or remove it and run again.",
             path=path,
         ) from error
-    people, biases = len(model.neutrals_mm), len(model.estimator.person_biases_)
-    if people and people != biases:
-        raise ModelFileError(
-            f"{people} people ({', '.join(model.neutrals_mm)}) with {biases} biases",
-            "one bias a person; an older Vermilion named people without training frames too",
-            "Train the regressor again with this version.",
-            path=path,
-        )
-    return model
 
 
 def _check_header(file: h5py.File, path: str | Path) -> None:
@@ -244,6 +245,8 @@ def _read(file: h5py.File) -> LipModel:
         vertices=file["mask/vertices"][:],
         training_frames=training,
         neutrals_mm={name: neutral[:] for name, neutral in persons},
+        shifts=file["features/shifts"][:],
+        neutral_features=file["features/neutral"][:],
         novelty_limit=float(file.attrs["novelty_limit"]),
         units=units,
     )

@@ -63,6 +63,7 @@ class Selection:
     choice: Rule = "least"
     basis_error: float = 0.03
     bias: Literal["person", "shared"] = "person"
+    anchor: Literal["neutral", "none"] = "neutral"
     novelty_quantile: float = 0.99
 
     def estimator(self, kind: Kind, groups: Sequence[str] | None) -> LinearOutputs:
@@ -86,8 +87,8 @@ class Selection:
         )
 
     def as_in_the_paper(self) -> Selection:
-        """Lips16 5.2 to the letter: one bias, no limit to the features, the least error."""
-        return replace(self, bias="shared", reach=1e9, choice="least")
+        """Lips16 5.2 to the letter: one bias, features as they are, no limit, the least error."""
+        return replace(self, bias="shared", anchor="none", reach=1e9, choice="least")
 
     def grid(self, kind: Kind) -> dict[str, list[float] | None]:
         """`alphas` and `betas` to try, ascending."""
@@ -171,7 +172,9 @@ def train(
             f"some of kind {wanted}",
             f"Leave the variant {name} out, or make such features.",
         )
-    features = data.features[:, columns].astype(np.float64)
+    shifts, neutral_features = _shifts(data, selection)
+    features = data.features.astype(np.float64)
+    features = (features - shifts[data.persons] if len(shifts) else features)[:, columns]
     groups = list(kinds[columns]) if selection.scaling == "group" else None
     weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
@@ -214,9 +217,25 @@ def train(
         vertices=vertices,
         training_frames=used,
         neutrals_mm=data.neutrals_mm if persons is not None else {},
+        shifts=shifts,
+        neutral_features=neutral_features,
         novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
     )
     return model, curve
+
+
+def _shifts(data: TrainingSet, selection: Selection) -> tuple[np.ndarray, np.ndarray]:
+    """What to take off each person's features (G, M), and the features (M,) of all neutrals then.
+
+    Trackers and contours err in a way of their own on every face, lips are thick or thin: what a
+    neutral shows of that, every frame of the person has (as C_f is taken back to C_0 in Lips16 eq. 1).
+    Nobody's are shifted whose neutral has no features.
+    """
+    known = data.neutral_features
+    if selection.anchor == "none" or selection.bias == "shared" or not known:
+        return np.zeros((0, 0)), np.zeros(0)
+    mean = np.mean(list(known.values()), axis=0, dtype=np.float64)
+    return np.array([known.get(subject, mean) - mean for subject in data.subjects]), mean
 
 
 def curve_table(name: str, curve: Curve, choice: Rule = "simplest") -> pd.DataFrame:

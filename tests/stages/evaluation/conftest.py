@@ -14,10 +14,11 @@ from tests.stages.test_correction import (
     run_correspondence,
     run_database,
     run_layers,
+    run_neutral_pair,
     run_train,
 )
 from vermilion.config.apply import OverlayConfig
-from vermilion.config.correction import LayersConfig, PictureConfig
+from vermilion.config.correction import PictureConfig
 from vermilion.config.evaluation import (
     ContourConfig,
     EvaluationConfig,
@@ -59,11 +60,11 @@ def scene(tmp_path_factory):
             run_layers(root, subject, chunk)
             add_contours(root / f"takes/{subject}/rom/correction/features/{chunk}.npz")
         write_identity(root, subject)
+        run_neutral_pair(root, subject)
     run_database(root)
     for regressor in MODELS:
         run_train(root, regressor)
     run_lip_shapes(root)
-    run_neutral_pair(root)
     evaluate(root, "truth", truth=True)
     evaluate(root, "held_out", truth=False)
     return SimpleNamespace(root=root, tracker=tracker)
@@ -113,28 +114,6 @@ def run_lip_shapes(root):
         },
         output={"shapes": root / "evaluation/lip_shapes.npz"},
     )
-
-
-def run_neutral_pair(root):
-    subject, take = root / f"subjects/{SUBJECT}", root / f"takes/{SUBJECT}/rom"
-    run_script(
-        "neutral_pair",
-        wildcards={"subject": SUBJECT},
-        params={
-            "cfg": {"correction.layers": LayersConfig().model_dump()}, "take": "rom", "first": 0,
-        },
-        input={
-            "template": root / "face/template.npz",
-            "tracker": root / "face/tracker.npz",
-            "accurate": take / "multiview/neutral.npz",
-            "coarse": take / f"tracking/C/{CHUNKS[0]}.npy",
-            "fit": take / "tracking/fit.npz",
-            "features": take / f"correction/features/{CHUNKS[0]}.npz",
-            "correspondence": subject / "correspondence.npz",
-            "identity": subject / "identity.npz",
-        },
-        output={"pair": subject / "neutral_pair.npz", "overlay": subject / "neutral_pair.png"},
-    )  # fmt: skip
 
 
 def evaluate(root, name, truth):
