@@ -109,7 +109,7 @@ def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int
     return (label == label[seed]) & ~on_loop
 
 
-def lip_sides(
+def upper_side(
     graph: sparse.spmatrix, outer: np.ndarray, inner: np.ndarray, landmarks: np.ndarray
 ) -> np.ndarray:
     """Which vertices belong to the upper lip's side (True) and which to the lower's, (V,) bool.

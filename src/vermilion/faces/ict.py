@@ -19,8 +19,8 @@ from vermilion.faces.contours import (
     edge_graph,
     enclosed,
     geodesic_distance,
-    lip_sides,
     smooth_loop,
+    upper_side,
 )
 from vermilion.faces.decimation import decimate_model
 from vermilion.faces.ict_archive import IctData
@@ -168,7 +168,7 @@ def _regions(
     past_meeting = enclosed(skin, n_vertices, inner, socket)
     depth = geodesic_distance(graph, inner)
     vermilion = lips_and_inside & ~(past_meeting & (depth > VERMILION_INSIDE_MM))
-    upper = lip_sides(graph, outer, inner, landmarks)
+    upper = upper_side(graph, outer, inner, landmarks)
     mouth_inner = past_meeting & ~vermilion
     mouth_inner[GUMS] = True
     index = np.arange(n_vertices)

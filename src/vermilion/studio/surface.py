@@ -13,7 +13,7 @@ from vermilion.faces.contours import (
     edge_graph,
     enclosed,
     geodesic_distance,
-    lip_sides,
+    upper_side,
 )
 from vermilion.faces.model import FaceModel
 from vermilion.mesh import unique_edges
@@ -54,7 +54,7 @@ def surface_of(model: FaceModel) -> Surface:
     graph = edge_graph(model.neutral_mm, skin)
     lip = _lip_distance(model, skin, graph)
     inside = _inside_distance(model, skin, graph)
-    upper = lip_sides(graph, model.outer_contour, model.inner_contour, model.landmarks)
+    upper = upper_side(graph, model.outer_contour, model.inner_contour, model.landmarks)
     brows = model.neutral_mm[model.landmarks[17:27], :2].reshape(2, 5, 2)
     return Surface(
         solid_mm=_solid(model, label).astype(np.float32),
