@@ -38,10 +38,10 @@ verify: $(READY)
 	@$(BIN)/python -m vermilion.workflow.checksums "$(RESULTS)"
 
 test: test-quick
-	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadgroup -m slow
+	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m slow
 
 test-quick: $(READY)
-	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadgroup -m "not slow"
+	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -12,18 +12,13 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import pytest  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
+#: The file that takes longest begins; those that wait for what it makes come last.
+_BEGIN, _END = ("test_faults",), ("test_reruns", "test_chunks")
 
 
 def pytest_collection_modifyitems(items):
-    """Share out the tests among processes (`-n 2 --dist loadgroup`) without making fixtures twice.
-
-    A file's tests stay together, and so do all that use the finished run of the tiny capture; these
-    take longest and begin.
-    """
-    for item in items:
-        group = "finished" if "finished" in item.fixturenames else item.path.stem
-        item.add_marker(pytest.mark.xdist_group(group))
-    items.sort(key=lambda item: "finished" not in item.fixturenames)
+    """Order the files for processes that each take one at a time (`-n 2 --dist loadfile`)."""
+    items.sort(key=lambda item: (item.path.stem not in _BEGIN) + (item.path.stem in _END))
 
 
 @pytest.fixture(scope="session")

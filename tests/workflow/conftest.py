@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
@@ -117,9 +118,20 @@ def fresh_project(tmp_path_factory) -> Project:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> Project:
-    """A copy in which a tiny capture has been run to its end. Tests leave it as they found it."""
-    project = copy_project(tmp_path_factory.mktemp("finished"))
-    project.snakemake("captures", "--config", "results=results/studio")
-    external = use_as_captures(project)
-    external.snakemake()
-    return external
+    """A copy in which a tiny capture has been run to its end. Tests leave it as they found it.
+
+    The run is made once for all processes that share the tests (pytest-xdist); each has its own copy.
+    """
+    here = tmp_path_factory.getbasetemp()
+    shared = here.parent if "PYTEST_XDIST_WORKER" in os.environ else here
+    made = shared / "finished"
+    with open(shared / "finished.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not made.is_dir():
+            folder = tmp_path_factory.mktemp("running")
+            project = copy_project(folder)
+            project.snakemake("captures", "--config", "results=results/studio")
+            use_as_captures(project).snakemake()
+            folder.rename(made)
+        shutil.copytree(made, here / "finished_copy", symlinks=True)
+    return Project(here / "finished_copy", "config/external.yaml")

@@ -6,13 +6,10 @@ import signal
 import subprocess
 import time
 
-import numpy as np
 import psutil
 import pytest
 
 from vermilion.workflow import checksums
-
-from .conftest import Project
 
 pytestmark = pytest.mark.slow
 
@@ -98,30 +95,3 @@ def test_truncated_output(finished, whole, capsys):
     finished.snakemake()
     checksums.main([str(finished.results)])
     assert "0 damaged file(s)" in capsys.readouterr().out
-
-
-def test_chunk_size_and_cores_change_no_result(finished):
-    other = Project(finished.folder, "config/chunks.yaml")
-    (finished.folder / other.configuration).write_text(
-        (finished.folder / finished.configuration).read_text()
-    )
-    other.edit_configuration(lambda c: c.update(results="results/chunks", chunk_frames=5))
-    pattern = "takes/s1/rom/{}/*.{}"
-    parts = [("multiview/H", "npy"), ("tracking/C", "npy"), ("correction/layers", "npz")]
-    targets = [
-        f"results/chunks/takes/s1/rom/{folder}/{chunk}.{suffix}"
-        for folder, suffix in parts
-        for chunk in ("000000-000004", "000005-000009", "000010-000011")
-    ]
-    other.snakemake("--cores", "1", *targets)
-
-    def joined(project, folder, suffix):
-        files = sorted(project.results.glob(pattern.format(folder, suffix)))
-        loaded = [np.load(f) if suffix == "npy" else np.load(f)["layers"] for f in files]
-        return np.concatenate(loaded)
-
-    for folder, suffix in parts:
-        ours, theirs = joined(other, folder, suffix), joined(finished, folder, suffix)
-        assert ours.shape == theirs.shape
-        off = np.nanmax(np.abs(ours - theirs))
-        assert off <= (0.01 if suffix == "npy" else 0.001), f"{folder}: {off}"
