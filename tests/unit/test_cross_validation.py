@@ -108,7 +108,7 @@ def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
     np.testing.assert_allclose(bias_of_a_stranger(alike, neutral), 1.0, atol=0.03)
     unlike = rng.normal(size=(4, 400))
     assert np.abs(bias_of_a_stranger(unlike, neutral)).mean() < 0.1
-    np.testing.assert_allclose(bias_of_a_stranger(alike[:1], neutral), alike[0] / 2)
+    np.testing.assert_array_equal(bias_of_a_stranger(alike[:1], neutral), 0.0)
 
 
 def test_what_people_share_in_layers_is_kept_though_their_displacements_differ():
@@ -125,6 +125,18 @@ def test_what_people_share_in_layers_is_kept_though_their_displacements_differ()
     assert np.abs(neutral[50:]).mean() < 0.5
     together = AffineRegressor(10.0).fit(features, targets, persons=persons)
     assert np.abs(together.predict(np.zeros((1, 5)))[0][:50] - 1.0).mean() > 0.1
+
+
+def test_a_stranger_gets_no_identity_of_the_only_person_known():
+    """Their expressions are moved alike, their neutral is not."""
+    rng = np.random.default_rng(4)
+    features, persons = rng.normal(size=(60, 5)), np.zeros(60, dtype=int)
+    features[0] = 0.0
+    matrix = rng.normal(size=(5, 8))
+    known = AffineRegressor(1e-6).fit(features, features @ matrix + 2.0, persons=persons)
+    asked = rng.normal(size=(3, 5))
+    np.testing.assert_allclose(known.predict(asked, 0), asked @ matrix + 2.0, atol=1e-3)
+    np.testing.assert_allclose(known.predict(asked), asked @ matrix, atol=1e-3)
 
 
 def test_choice_takes_the_smoothest_within_one_standard_error(data):

@@ -222,8 +222,8 @@ def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
     """Bias (K,) for a person whom the training has not seen.
 
     The layer at the neutral is identity. A stranger's is expected to be the mean of those seen,
-    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people, and one
-    half where there is but one.
+    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people. Of one
+    person alone nothing tells what is theirs and what everybody's: none of it is a stranger's.
 
     Args:
         biases: (G, K) of the people seen.
@@ -231,7 +231,7 @@ def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
     """
     identity = biases + neutral
     mean, n_persons = identity.mean(axis=0), len(biases)
-    worth = 0.5
+    worth = 0.0
     if n_persons > 1:
         spread = identity.var(axis=0, ddof=1).mean() / n_persons
         worth = float(np.clip(1.0 - spread / max(float((mean**2).mean()), 1e-300), 0.0, 1.0))
