@@ -98,21 +98,22 @@ def run_neutral_pair(root, subject):
     person, take = root / f"subjects/{subject}", root / f"takes/{subject}/rom"
     run_script(
         "neutral_pair",
-        wildcards={"subject": subject},
-        params={
-            "cfg": {"correction.layers": LayersConfig().model_dump()}, "take": "rom", "first": 0,
-        },
+        wildcards={"subject": subject, "take": "rom"},
+        params={"cfg": {"correction.layers": LayersConfig().model_dump()}, "frame": 0},
         input={
             "template": root / "face/template.npz",
             "tracker": root / "face/tracker.npz",
             "accurate": take / "multiview/neutral.npz",
-            "coarse": take / f"tracking/C/{CHUNKS[0]}.npy",
+            "coarse": [take / f"tracking/C/{CHUNKS[0]}.npy"],
             "fit": take / "tracking/fit.npz",
-            "features": take / f"correction/features/{CHUNKS[0]}.npz",
+            "features": [take / f"correction/features/{CHUNKS[0]}.npz"],
             "correspondence": person / "correspondence.npz",
             "identity": person / "identity.npz",
         },
-        output={"pair": person / "neutral_pair.npz", "overlay": person / "neutral_pair.png"},
+        output={
+            "pair": take / "correction/neutral_pair.npz",
+            "overlay": take / "correction/overlay/neutral_pair.png",
+        },
     )  # fmt: skip
 
 
@@ -140,7 +141,7 @@ def run_database(root):
             "features": [f / f"features/{c}.npz" for f in chunk_files for c in CHUNKS],
             "correspondence": [root / f"subjects/{s}/correspondence.npz" for s in SUBJECTS],
             "identity": [root / f"subjects/{s}/identity.npz" for s in SUBJECTS],
-            "neutral_pair": [root / f"subjects/{s}/neutral_pair.npz" for s in SUBJECTS],
+            "neutral_pair": [f / "neutral_pair.npz" for f in chunk_files],
         },
         output={"database": root / "database/lips.h5"},
     )

@@ -1,4 +1,4 @@
-"""A person made known to a regressor by one pair of neutrals."""
+"""A person, and a take, made known to a regressor by pairs of neutrals."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def model():
 def pair():
     coarse = shape(3)
     return NeutralPair(
-        "eva", coarse, coarse + shape(4) / 15, np.array([0.2, 9.0, -0.1, 0.4]), np.array(NAMES),
+        "eva", "rom", coarse, coarse + shape(4) / 15, np.array([0.2, 9.0, -0.1, 0.4]), np.array(NAMES),
         shape(5),
     )  # fmt: skip
 
 
 def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
-    known = acquainted(model, pair, TRIANGLES)
+    known = acquainted(model, TRIANGLES, pair)
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     np.testing.assert_allclose(layers, true, atol=1e-5)
@@ -67,7 +67,7 @@ def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
 
 
 def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
-    known = acquainted(model, pair, TRIANGLES)
+    known = acquainted(model, TRIANGLES, pair)
     features = np.random.default_rng(6).normal(size=(5, 4))
     of_a_stranger = features - pair.features + model.neutral_features
     difference = known.predict(features, pair.neutral_mm) - model.predict(of_a_stranger)
@@ -80,17 +80,17 @@ def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
 
 def test_what_all_their_frames_have_in_common_changes_nothing(model, pair):
     features, off = np.random.default_rng(6).normal(size=(5, 4)), np.array([0.4, -0.2, 0.8, 1.5])
-    known = acquainted(model, pair, TRIANGLES).predict(features, pair.neutral_mm)
+    known = acquainted(model, TRIANGLES, pair).predict(features, pair.neutral_mm)
     pair = replace(pair, features=pair.features + off)
-    again = acquainted(model, pair, TRIANGLES).predict(features + off, pair.neutral_mm)
+    again = acquainted(model, TRIANGLES, pair).predict(features + off, pair.neutral_mm)
     np.testing.assert_allclose(again, known, atol=1e-6)
 
 
 def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
     accurate = pair.accurate_mm.copy()
     accurate[4] = np.nan  # a corner of the second triangle of the mask
-    known = acquainted(model, replace(pair, accurate_mm=accurate), TRIANGLES)
-    whole = acquainted(model, pair, TRIANGLES)
+    known = acquainted(model, TRIANGLES, replace(pair, accurate_mm=accurate))
+    whole = acquainted(model, TRIANGLES, pair)
     features = pair.features[None]
     found = known.predict(features, pair.neutral_mm)[0]
     np.testing.assert_allclose(found[0], whole.predict(features, pair.neutral_mm)[0, 0], atol=1e-6)
@@ -98,9 +98,64 @@ def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
     np.testing.assert_allclose(found[1], stranger[0, 1], atol=1e-6)
 
 
+def errors(model, pairs):
+    """What is wrong of the layers of each neutral frame (P, 2, 9)."""
+    return np.array([
+        model.predict(pair.features[None], pair.neutral_mm)[0]
+        - correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
+        for pair in pairs
+    ])  # fmt: skip
+
+
+@pytest.fixture
+def of_take(pair):
+    """The same person in other light: the coarse track and the features err by more."""
+    return replace(
+        pair,
+        take="phone",
+        coarse_mm=pair.coarse_mm + shape(7) / 60,
+        features=pair.features + np.array([0.1, 0.0, -0.1, 0.2]),
+    )
+
+
+def test_of_two_neutrals_the_mean_is_right_and_features_are_the_takes(model, pair, of_take):
+    known = acquainted(model, TRIANGLES, pair, of_take)
+    wrong = errors(known, [pair, of_take])
+    np.testing.assert_allclose(wrong.mean(axis=0), 0.0, atol=1e-5)
+    assert np.abs(wrong).max() > 1e-3
+    alone = acquainted(model, TRIANGLES, None, of_take)
+    np.testing.assert_array_equal(known.shifts, alone.shifts)
+    np.testing.assert_allclose(errors(alone, [of_take]), 0.0, atol=1e-5)
+
+
+def test_a_person_of_the_training_is_half_known_already(model, pair, of_take):
+    trained, of_rig = (
+        replace(each, neutral_mm=shape(1), subject="zoe") for each in (of_take, pair)
+    )
+    known = acquainted(model, TRIANGLES, of_rig, trained)
+    assert sorted(known.neutrals_mm) == ["ana", "zoe"]
+    shift = trained.features - model.neutral_features
+    same_features = replace(model, shifts=np.array([shift, model.shifts[1]]))
+    before = errors(same_features, [trained])
+    np.testing.assert_allclose(errors(known, [trained]), before / 2, atol=1e-5)
+    features = np.random.default_rng(6).normal(size=(5, 4))
+    np.testing.assert_array_equal(
+        known.predict(features, shape(2)), model.predict(features, shape(2))
+    )
+
+
+def test_a_bad_neutral_of_the_take_leaves_that_of_the_person(model, pair, of_take):
+    bad = replace(of_take, reason="no contour features")
+    known, expected = (
+        acquainted(model, TRIANGLES, pair, other).predict(pair.features[None], pair.neutral_mm)
+        for other in (bad, None)
+    )
+    np.testing.assert_array_equal(known, expected)
+
+
 def test_a_bad_pair_and_a_person_of_the_training_change_nothing(model, pair):
-    assert acquainted(model, replace(pair, reason="the coarse track failed"), TRIANGLES) is model
-    assert acquainted(model, replace(pair, neutral_mm=shape(2)), TRIANGLES) is model
+    assert acquainted(model, TRIANGLES, replace(pair, reason="the coarse track failed")) is model
+    assert acquainted(model, TRIANGLES, replace(pair, neutral_mm=shape(2))) is model
 
 
 def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
@@ -109,20 +164,22 @@ def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
         np.random.default_rng(1).normal(size=(40, 30)).astype(np.float32),
     )
     one = replace(model, estimator=estimator, neutrals_mm={}, shifts=np.zeros((0, 0)))
-    known = acquainted(one, pair, TRIANGLES)
+    known = acquainted(one, TRIANGLES, pair)
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     np.testing.assert_allclose(layers, true, atol=1e-5)
 
 
 def test_other_features_are_refused_with_the_person_named(model, pair):
-    with pytest.raises(InputError, match=r"subject eva.*features that are not the regressor's"):
-        acquainted(model, replace(pair, feature_names=np.array(NAMES[:3])), TRIANGLES)
+    with pytest.raises(
+        InputError, match=r"subject eva, take rom.*features that are not the regressor's"
+    ):
+        acquainted(model, TRIANGLES, replace(pair, feature_names=np.array(NAMES[:3])))
 
 
 def test_round_trip(pair, tmp_path):
     pair.save(tmp_path / "pair.npz")
     read = NeutralPair.load(tmp_path / "pair.npz")
-    assert (read.subject, read.reason) == ("eva", "")
+    assert (read.subject, read.take, read.reason) == ("eva", "rom", "")
     np.testing.assert_array_equal(read.accurate_mm, pair.accurate_mm)
     np.testing.assert_array_equal(read.features, pair.features)

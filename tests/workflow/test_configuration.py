@@ -63,14 +63,32 @@ def test_takes_that_are_named_must_exist(tmp_path):
     raw = {
         "takes": str(sheet),
         "apply": {"takes": ["anna/other"]},
+        "correction": {"neutral_frames": {"anna/shot": 0}},
         "studio": {"subjects": {"berta": {}}},
     }
     with pytest.raises(ConfigurationError) as error:
         load_configuration(raw, "mine.yaml")
     text = str(error.value)
     assert "key apply.takes: found 'anna/other'" in text
+    assert "neutral_frames: found 'anna/shot'; expected a take of role video of a subject" in text
     assert "studio.subjects: found ['berta']; expected also 'anna'" in text
     assert "studio.subjects.berta: found a subject without takes" in text
+
+
+def test_a_neutral_frame_is_one_of_the_take(tmp_path):
+    sheet = tmp_path / "takes.tsv"
+    sheet.write_text(
+        "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\n"
+        "anna\trom\ttattoo\trig\t0\t9\t25\ttrain\n"
+        "anna\tshot\tvideo\tx.mp4\t5\t9\t25\tnone\n"
+    )
+    raw = {"takes": str(sheet), "correction": {"neutral_frames": {"anna/shot": 4}}}
+    with pytest.raises(ConfigurationError) as error:
+        load_configuration(raw, "mine.yaml", check_disk=False)
+    assert (
+        "mine.yaml, key correction.neutral_frames.anna/shot: found frame 4; expected one of 5 to 9"
+        in str(error.value)
+    )
 
 
 @pytest.mark.parametrize("name", sorted(generated_files()))

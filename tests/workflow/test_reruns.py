@@ -67,6 +67,16 @@ def test_ridge_parameter(finished):
         assert set(finished.would_run()) == AFTER_TRAINING | {"train"}
 
 
+def test_neutral_frame_of_a_video(finished):
+    def change(content):
+        content["correction"] = {"neutral_frames": {"s1/phone": 1}}
+
+    with configured(finished, change):
+        jobs = finished.would_run()
+    assert set(jobs) == AFTER_TRAINING | {"neutral_pair"}
+    assert (jobs["neutral_pair"], jobs["evaluate"]) == (1, 1)  # of this take only
+
+
 def test_feather_width(finished):
     def change(content):
         content.setdefault("inpaint", {})["mask"] = {"feather_mm": 1.25}

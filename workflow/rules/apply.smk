@@ -9,12 +9,12 @@ def apply_model(wildcards):
 
 
 def apply_neutral(wildcards):
-    """The neutral of a person whom the regressor was not trained on, if it is known (`unpack`)."""
+    """Neutrals that tell a regressor what it does not know: the person's, the take's (`unpack`)."""
     name = CONFIG.apply.regressor.replace("{subject}", wildcards.subject)
     known = wildcards.subject in trained_on(name, trained_subjects())
     if known or not takes("tattoo", wildcards.subject):
-        return {}
-    return {"neutral_pair": f"{R}/subjects/{wildcards.subject}/neutral_pair.npz"}
+        return neutral_of_take(wildcards)
+    return {"neutral_pair": neutral_pair_of(wildcards.subject), **neutral_of_take(wildcards)}
 
 
 def apply_exports():

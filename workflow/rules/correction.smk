@@ -30,31 +30,58 @@ rule layers:
         "../scripts/layers.py"
 
 
+NEUTRAL_PAIR = R + "/takes/{subject}/{take}/correction/neutral_pair.npz"
+
+
+def neutral_pair_of(subject):
+    """The neutral pair of a subject: that of their reference take."""
+    return NEUTRAL_PAIR.format(subject=subject, take=takes("tattoo", subject)[0].take)
+
+
+def neutral_frame(wildcards):
+    """Frame of a take that shows the neutral: the first of a rig take, the marked one of a video."""
+    take = take_of(wildcards)
+    return CONFIG.correction.neutral_frames.get(take.name, take.first)
+
+
+def neutral_of_take(wildcards):
+    """The neutral pair of a video that has a neutral frame (use with `unpack`)."""
+    marked = take_of(wildcards).name in CONFIG.correction.neutral_frames
+    return {"neutral_of_take": NEUTRAL_PAIR.format(**wildcards)} if marked else {}
+
+
+def neutral_takes():
+    """Takes whose neutral pairs are used: reference takes, and videos with a neutral frame."""
+    first = [takes("tattoo", subject)[0] for subject in subjects("tattoo")]
+    return first + [
+        take for take in takes("video") if take.name in CONFIG.correction.neutral_frames
+    ]
+
+
 rule neutral_pair:
-    """A person's coarse and accurate neutral: neutral_pair.npz (Lips16 4.2, D of eq. 1)."""
+    """Coarse and accurate neutral of a take: neutral_pair.npz (Lips16 4.2, D of eq. 1)."""
     input:
         template=R + "/face/template.npz",
         tracker=tracker_of,
         accurate=of_reference_take(R + "/takes/{subject}/{take}/multiview/neutral.npz"),
-        coarse=of_reference_take(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
-        fit=of_reference_take(R + "/takes/{subject}/{take}/tracking/fit.npz"),
-        features=of_reference_take(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
+        coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
+        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
+        features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         identity=R + "/subjects/{subject}/identity.npz",
     output:
-        pair=R + "/subjects/{subject}/neutral_pair.npz",
-        overlay=R + "/subjects/{subject}/overlay/neutral_pair.png",
+        pair=NEUTRAL_PAIR,
+        overlay=R + "/takes/{subject}/{take}/correction/overlay/neutral_pair.png",
     log:
-        R + "/logs/neutral_pair/{subject}.log",
+        R + "/logs/neutral_pair/{subject}-{take}.log",
     benchmark:
-        R + "/benchmarks/neutral_pair/{subject}.tsv"
+        R + "/benchmarks/neutral_pair/{subject}-{take}.tsv"
     resources:
         mem_mb=1000,
         runtime=20,
     params:
         cfg=cfg_of("correction.layers"),
         code=code_of("neutral_pair"),
-        take=lambda wildcards: reference_take(wildcards).take,
-        first=lambda wildcards: reference_take(wildcards).first,
+        frame=neutral_frame,
     script:
         "../scripts/neutral_pair.py"

@@ -32,9 +32,7 @@ rule database:
         identity=lambda wildcards: [
             f"{R}/subjects/{subject}/identity.npz" for subject in subjects("tattoo")
         ],
-        neutral_pair=lambda wildcards: [
-            f"{R}/subjects/{subject}/neutral_pair.npz" for subject in subjects("tattoo")
-        ],
+        neutral_pair=lambda wildcards: list(map(neutral_pair_of, subjects("tattoo"))),
     output:
         database=R + "/database/lips.h5",
     log:

@@ -41,11 +41,12 @@ rule evaluate:
     """Applies every regressor to the held-out frames of a take and measures: measures.tsv."""
     input:
         unpack(evaluate_inputs),
+        unpack(neutral_of_take),
         tracker=tracker_of,
         template=R + "/face/template.npz",
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         identity=R + "/subjects/{subject}/identity.npz",
-        neutral_pair=R + "/subjects/{subject}/neutral_pair.npz",
+        neutral_pair=lambda wildcards: neutral_pair_of(wildcards.subject),
         shapes=R + "/evaluation/lip_shapes.npz",
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),

@@ -67,8 +67,7 @@ def subject_outputs():
     for subject in subjects("tattoo"):
         paths.append(f"{R}/subjects/{subject}/plain_texture.exr")
         paths.append(f"{R}/subjects/{subject}/correspondence.npz")
-        paths.append(f"{R}/subjects/{subject}/neutral_pair.npz")
-    return paths
+    return paths + of_takes(NEUTRAL_PAIR, neutral_takes())
 
 
 def evaluation_outputs():

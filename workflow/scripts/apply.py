@@ -6,7 +6,7 @@ from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.apply import correct_sequence
-from vermilion.correction.neutral_pair import NeutralPair, acquainted
+from vermilion.correction.neutral_pair import acquainted, neutral_pairs
 from vermilion.correction.picture import (
     PICTURE_ARRAYS,
     Picture,
@@ -41,8 +41,7 @@ def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
     tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
-    if inputs.get("neutral_pair"):
-        model = acquainted(model, NeutralPair.load(inputs.neutral_pair), tracker.triangles)
+    model = acquainted(model, tracker.triangles, *neutral_pairs(inputs))
     identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
     settings = CorrectionConfig(
         integration=params.cfg["correction.integration"], picture=params.cfg["correction.picture"]

@@ -12,6 +12,7 @@ from vermilion.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.mesh import Mesh
+from vermilion.multiview.files import read_neutral
 from vermilion.quality import write_quality
 from vermilion.sequences import read_sequence
 from vermilion.tracking.result import TrackedTake
@@ -21,11 +22,12 @@ def main(snakemake):
     inputs, output = snakemake.input, snakemake.output
     subject, take = snakemake.wildcards.subject, snakemake.params.take
     template, tracker = FaceModel.load(inputs.template), FaceModel.load(inputs.tracker)
-    with np.load(inputs.accurate) as data:
-        accurate = Mesh(data["vertices_mm"].astype(np.float64), template.triangles)
+    place = {"subject": subject, "take": take}
+    accurate = read_neutral(inputs.accurate, template.n_vertices, **place).astype(np.float64)
+    accurate = Mesh(accurate, template.triangles)
     coarse = Mesh(read_sequence(inputs.coarse)[0].astype(np.float64), tracker.triangles)
     fit, track = TrackedTake.load(inputs.fit), LandmarkTrack.load(inputs.landmarks)
-    neutral = Neutral.of(coarse, accurate, fit, track, subject=subject, take=take)
+    neutral = Neutral.of(coarse, accurate, fit, track, **place)
     settings = CorrespondenceConfig(**snakemake.params.cfg["correspondence"]).model_dump()
     found, registered, landmarks = correspond_neutrals(neutral, tracker, template, **settings)
     found.save(output.correspondence)

@@ -7,7 +7,7 @@ import numpy as np
 from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
-from vermilion.correction.neutral_pair import NeutralPair, acquainted
+from vermilion.correction.neutral_pair import acquainted, neutral_pairs
 from vermilion.correction.picture import (
     PICTURE_ARRAYS,
     Picture,
@@ -110,14 +110,14 @@ def oracle(inputs, correspondence, around, rows):
 
 
 def regressors(inputs, around, rows):
-    """Name -> what each model makes of the `rows` of a take; GR also with the person's neutral."""
-    regressed, pair = {}, NeutralPair.load(inputs.neutral_pair)
+    """Name -> what each model makes of the `rows` of a take; also told the neutrals that are known."""
+    regressed, pairs = {}, neutral_pairs(inputs)
     for path in inputs.models:
         name, model = measure_name(Path(path).stem), load_model(path)
         take = around.as_in_paper() if name.endswith("/paper") else around
         regressed[name] = held_out.Regressed.of(model, take, rows)
-        if name.startswith("GR-") and "/" not in name and not pair.reason:
-            known = acquainted(model, pair, around.triangles)
+        known = model if "/" in name else acquainted(model, around.triangles, *pairs)
+        if known is not model:
             regressed[f"{name}/neutral"] = held_out.Regressed.of(known, take, rows)
     return regressed
 

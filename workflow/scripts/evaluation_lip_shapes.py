@@ -4,6 +4,7 @@ from functools import reduce
 
 import numpy as np
 
+from vermilion.arrays import read_arrays
 from vermilion.chunks import read_frames
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.lip_shapes import PosedTake, choose_lip_shapes
@@ -20,10 +21,8 @@ def posed(take, chunks, qualities, neutral, correspondence):
         table = read_table(path, ["frame", "valid"])
         bad |= set(table.loc[table["valid"] == 0, "frame"])
     frames = np.array([frame for frame in take["train"] if frame not in bad], dtype=int)
-    with np.load(neutral) as data:
-        return PosedTake.of(
-            take["take"], frames, read_frames(chunks, frames), data["vertices_mm"], correspondence
-        )
+    at_rest = read_arrays(neutral, f"neutral of {take['take']}", ("vertices_mm",))["vertices_mm"]
+    return PosedTake.of(take["take"], frames, read_frames(chunks, frames), at_rest, correspondence)
 
 
 def main(snakemake):

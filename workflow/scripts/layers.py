@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vermilion.arrays import read_arrays
 from vermilion.config.correction import LayersConfig
 from vermilion.correction.overlay import layers_overlay
 from vermilion.correction.take_layers import quality_rows, save_layers, take_layers
@@ -20,8 +21,8 @@ def main(snakemake):
     cfg = LayersConfig(**snakemake.params.cfg["correction.layers"])
     correspondence, fit = Correspondence.load(inputs.correspondence), TrackedTake.load(inputs.fit)
     rows = fit.index_of(frames)
-    with np.load(inputs.accurate_neutral) as data:
-        neutral = data["vertices_mm"].astype(np.float64)
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
+    neutral = read_arrays(inputs.accurate_neutral, "neutral", ("vertices_mm",), **place)
     reconstructed = read_table(inputs.accurate_quality, ["frame", "valid"])
     bad = set(reconstructed.loc[reconstructed["valid"] == 0, "frame"])
     made = take_layers(
@@ -31,7 +32,7 @@ def main(snakemake):
         fit.world_from_head_rotation[rows],
         fit.world_from_head_translation_mm[rows],
         head=cfg.head,
-        accurate_neutral_mm=neutral,
+        accurate_neutral_mm=neutral["vertices_mm"].astype(np.float64),
         face=FaceModel.load(inputs.tracker).regions["face"] if cfg.region == "face" else None,
     )
     checked, quality = quality_rows(
@@ -42,8 +43,7 @@ def main(snakemake):
         max_alignment_mm=cfg.max_alignment_mm,
     )
     write_srgb8(output.overlay, layers_overlay(correspondence, checked, frames))
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    write_quality(output.quality, *place, "correction", quality)
+    write_quality(output.quality, *place.values(), "correction", quality)
     save_layers(
         output.layers, checked, frames, correspondence.mask, correspondence.coarse_triangles
     )

@@ -1,8 +1,9 @@
-"""A person's coarse and accurate neutral, one laid on the other, with the picture of their layer."""
+"""Coarse and accurate neutral of a take, one laid on the other, with the picture of their layer."""
 
 import numpy as np
 
 from vermilion.arrays import read_arrays
+from vermilion.chunks import read_chunks, read_frames
 from vermilion.config.correction import LayersConfig
 from vermilion.correction.neutral_pair import NeutralPair
 from vermilion.correction.overlay import layers_overlay
@@ -12,21 +13,20 @@ from vermilion.faces.model import FaceModel
 from vermilion.images import write_srgb8
 from vermilion.logfile import log_to
 from vermilion.multiview.files import read_neutral
-from vermilion.sequences import read_sequence
 from vermilion.tracking.result import Identity, TrackedTake
 
 
 def main(snakemake):
-    inputs, first = snakemake.input, snakemake.params.first
-    place = {"subject": snakemake.wildcards.subject, "take": snakemake.params.take}
+    inputs, frame = snakemake.input, snakemake.params.frame
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     cfg = LayersConfig(**snakemake.params.cfg["correction.layers"])
     correspondence, fit = Correspondence.load(inputs.correspondence), TrackedTake.load(inputs.fit)
-    template, row = FaceModel.load(inputs.template), fit.index_of([first])
+    template, row = FaceModel.load(inputs.template), fit.index_of([frame])
     neutral = read_neutral(inputs.accurate, template.n_vertices, **place)
     made = take_layers(
         correspondence,
         neutral[None],
-        read_sequence(inputs.coarse)[:1],
+        read_frames(inputs.coarse, [frame]),
         fit.world_from_head_rotation[row],
         fit.world_from_head_translation_mm[row],
         accurate_neutral_mm=neutral,
@@ -35,30 +35,31 @@ def main(snakemake):
     )
     checked, (quality,) = quality_rows(
         made,
-        [first],
+        [frame],
         tracked=fit.valid[row],
         reconstructed=np.ones(1, dtype=bool),
         max_alignment_mm=cfg.max_alignment_mm,
     )
-    found = read_arrays(inputs.features, "feature file", ("features", "valid", "names"), **place)
+    found = read_chunks(inputs.features, [frame], ["features", "valid"])
+    names = read_arrays(inputs.features[0], "feature file", ("names",), **place)["names"]
     reason = quality.reason or ("" if found["valid"][0] else "no contour features")
     if reason:
         print(
-            f"WARNING: {place['subject']}/{place['take']}, frame {first}: found {reason}; expected a "
-            "neutral. Regressors that were not trained on this person take them for a stranger. Look "
-            "at the overlays of this frame."
+            f"WARNING: {place['subject']}/{place['take']}, frame {frame}: found {reason}; expected a "
+            "neutral. Regressors are not told of it. Look at the overlays of this frame, or mark another "
+            "one in correction.neutral_frames."
         )
     pair = NeutralPair(
-        subject=place["subject"],
+        **place,
         coarse_mm=made.coarse_mm[0],
         accurate_mm=made.accurate_mm[0],
         features=found["features"][0],
-        feature_names=found["names"],
+        feature_names=names,
         neutral_mm=Identity.load(inputs.identity).neutral_mm,
         reason=reason,
     )
     pair.save(snakemake.output.pair)
-    write_srgb8(snakemake.output.overlay, layers_overlay(correspondence, checked, [first]))
+    write_srgb8(snakemake.output.overlay, layers_overlay(correspondence, checked, [frame]))
 
 
 if __name__ == "__main__":

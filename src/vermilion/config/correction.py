@@ -126,6 +126,11 @@ class CorrectionConfig(StageConfig):
     picture: PictureConfig = Field(
         default_factory=PictureConfig, description="Agreeing with the picture."
     )
+    neutral_frames: dict[str, int] = Field(
+        default_factory=dict,
+        description="Videos with a frame of the neutral that the person's rig takes begin with (mouth "
+        "slightly open, as there): `subject/take: frame`. It tells how the track errs in this take.",
+    )
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""

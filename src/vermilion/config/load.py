@@ -126,6 +126,19 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"{origin}, key apply.takes: found '{name}' of role {by_name[name].role}; expected "
                 "role video or tattoo. Only these have the features that a regressor needs."
             )
+    with_rig = {take.subject for take in takes if take.role == "tattoo"}
+    for name, frame in configuration.correction.neutral_frames.items():
+        key, take = f"{origin}, key correction.neutral_frames", by_name.get(name)
+        if take is None or take.role != "video" or take.subject not in with_rig:
+            problems.append(
+                f"{key}: found '{name}'; expected a take of role video of a subject who has a take of "
+                "role tattoo, written subject/take. Correct or remove it."
+            )
+        elif not take.first <= frame <= take.last:
+            problems.append(
+                f"{key}.{name}: found frame {frame}; expected one of {take.first} to {take.last}, the "
+                "frames of the take."
+            )
     refined = {
         "takes": configuration.detail.takes,
         "shading.takes": configuration.detail.shading.takes,

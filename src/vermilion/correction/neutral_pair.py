@@ -3,7 +3,8 @@
 What a regressor adds to a coarse mesh has two parts: what the tracker gets wrong of an expression,
 which people have in common, and what it gets wrong of the person, which is theirs alone: the layer
 between the two neutrals. Of people whom a regressor was trained on it knows both. Of anybody else
-one frame tells the second: the neutral from a rig.
+one frame tells the second: the neutral from a rig. It is not quite the same in every take, as camera
+and light change what a tracker sees: a neutral frame of the take that is corrected tells that.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
 
 @dataclass(frozen=True)
 class NeutralPair:
-    """The neutral frame of a person.
+    """A neutral frame of a person.
 
     Attributes:
         subject: their name.
+        take: of the frame.
         coarse_mm: (V, 3) **C** of that frame, head frame.
         accurate_mm: (V, 3) **H** of that frame on C's topology, laid on it; NaN where H is absent.
         features: (M,) of that frame; NaN where it has none.
@@ -35,6 +37,7 @@ class NeutralPair:
     """
 
     subject: str
+    take: str
     coarse_mm: np.ndarray
     accurate_mm: np.ndarray
     features: np.ndarray
@@ -50,43 +53,75 @@ class NeutralPair:
     def load(cls, path: str | Path) -> NeutralPair:
         """Read what `save` wrote."""
         arrays = read_arrays(path, "neutral pair", [f.name for f in fields(cls)])
-        texts = {name: str(arrays[name]) for name in ("subject", "reason")}
+        texts = {name: str(arrays[name]) for name in ("subject", "take", "reason")}
         return cls(**{**arrays, **texts})
 
 
-def acquainted(model: LipModel, pair: NeutralPair, triangles: np.ndarray) -> LipModel:
-    """The model with the person of a pair among those whom it knows.
+def acquainted(
+    model: LipModel,
+    triangles: np.ndarray,
+    of_person: NeutralPair | None,
+    of_take: NeutralPair | None = None,
+) -> LipModel:
+    """The model, told how the track errs on a person, and in the take that is to be corrected.
 
-    Their features are taken from those of the neutral frame, as in the training. Their bias is such
-    that the neutral frame is corrected to the accurate neutral; outputs where H is absent keep a
-    stranger's. The model itself where it was trained on the person, or where the
-    pair is not to be used.
+    Features are taken from those of the neutral frame, as in the training: of the take's, else the
+    person's, as each camera and light has errors of its own. The person's bias is the mean of what is
+    known of it: that of the training, or for somebody else the one that corrects the neutral of their
+    rig to the accurate one; and the one that does so with the take's. Each errs by half a
+    millimetre and more in its own way, so that two are better than either. Outputs where H is absent
+    keep the bias that they have. The model itself where nothing is told that it did not know.
 
     Args:
         triangles: (T, 3) of the coarse mesh.
+        of_person: the neutral of their rig take; of no use where the model was trained on the person.
+        of_take: that of the take to be corrected.
     """
-    if pair.reason or model.person_of(pair.neutral_mm) is not None:
+    given = [pair for pair in (of_person, of_take) if pair is not None and not pair.reason]
+    person = model.person_of(given[0].neutral_mm) if given else None
+    told = [pair for pair in given if person is None or pair is of_take]
+    if not told:
         return model
+    for pair in told:
+        _check(model, pair)
+    model.check_topology(triangles)
+    own = told[-1]
+    shift = own.features - model.neutral_features if len(model.shifts) else 0.0
+    estimator, before = copy.copy(model.estimator), model.estimator.bias_of(person)
+    known = [] if person is None else [before]
+    for pair in told:
+        seen = (pair.features - shift)[None, model.feature_columns]
+        expression = estimator.mixture(seen)[0] @ estimator.basis_
+        known.append(_target(model, pair, triangles) - expression)
+    mean = np.mean(known, axis=0)
+    bias = np.where(np.isfinite(mean), mean, before).astype(before.dtype)
+    names = list(model.neutrals_mm)
+    others = [k for k in range(len(names)) if k != person]
+    estimator.person_biases_ = np.concatenate([estimator.person_biases_[others], bias[None]])
+    shifts = model.shifts
+    if len(shifts):
+        shifts = np.concatenate([shifts[others], shift[None]])
+    neutrals = {names[k]: model.neutrals_mm[names[k]] for k in others}
+    neutrals[own.subject] = own.neutral_mm
+    return replace(model, estimator=estimator, neutrals_mm=neutrals, shifts=shifts)
+
+
+def neutral_pairs(inputs) -> list[NeutralPair | None]:
+    """What `acquainted` is told, from a job's inputs `neutral_pair` and `neutral_of_take`; None if absent."""
+    paths = (inputs.get(name) for name in ("neutral_pair", "neutral_of_take"))
+    return [NeutralPair.load(path) if path else None for path in paths]
+
+
+def _check(model: LipModel, pair: NeutralPair) -> None:
+    """Raise InputError where a pair's features are not those of the model."""
     if tuple(pair.feature_names) != tuple(model.feature_names):
         raise InputError(
             f"a neutral with {len(pair.feature_names)} features that are not the regressor's",
             f"the {len(model.feature_names)} features that {model.name} was trained on",
             "Measure the features of both with one configuration.",
             subject=pair.subject,
+            take=pair.take,
         )
-    model.check_topology(triangles)
-    target = _target(model, pair, triangles)
-    shift = pair.features - model.neutral_features if len(model.shifts) else 0.0
-    seen = (pair.features - shift)[None, model.feature_columns]
-    known = target - model.estimator.mixture(seen)[0] @ model.estimator.basis_
-    stranger = model.estimator.bias_of(None)
-    estimator = copy.copy(model.estimator)
-    biases = model.estimator.person_biases_[: len(model.neutrals_mm)]
-    bias = np.where(np.isfinite(known), known, stranger).astype(stranger.dtype)
-    estimator.person_biases_ = np.concatenate([biases, bias[None]])
-    neutrals = {**model.neutrals_mm, pair.subject: pair.neutral_mm}
-    shifts = np.concatenate([model.shifts, shift[None]]) if len(model.shifts) else model.shifts
-    return replace(model, estimator=estimator, neutrals_mm=neutrals, shifts=shifts)
 
 
 def _target(model: LipModel, pair: NeutralPair, triangles: np.ndarray) -> np.ndarray:

@@ -61,8 +61,8 @@ def questions_of(regressor: str) -> list[Question]:
         Question("The configured regressor against Lips16 to the letter", "", "paper"),
         Question("The configured regressor against the contour baseline", "", "=contour"),
         Question("The configured regressor against the base track", "", "=base"),
-        Question("A stranger's neutral known against unknown", "neutral", ""),
-        Question("A stranger's neutral known against the base track", "neutral", "=base"),
+        Question("The neutral known against unknown", "neutral", ""),
+        Question("The neutral known against the base track", "neutral", "=base"),
     ]
 
 

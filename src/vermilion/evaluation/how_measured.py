@@ -37,8 +37,9 @@ def how_measured(
 
 _REGRESSORS = """
 <p><b>Regressors.</b> PS is trained on the person, MS on all, GR on all but the person; a person who trains
-nothing is judged by GR alone. <i>GR/neutral</i> is the same GR, told one frame of the person, the accurate neutral of
-their rig take and the coarse one: who it is (D of Lips16 eq. 1), nothing of how they move. Frames that failed in an earlier stage are in none of them.</p>
+nothing is judged by GR alone. <i>PS/neutral</i>, <i>MS/neutral</i> and <i>GR/neutral</i> are the same, told how the track errs
+on a neutral (D of Lips16 eq. 1): in the video itself, where a frame of it is marked (<code>correction.neutral_frames</code>), and GR also in
+the person's rig take; nothing of how they move. Frames that failed in an earlier stage are in none of them.</p>
 """
 
 _TEXT = """

@@ -18,7 +18,7 @@ def kind_of(regressor: str) -> str:
 def is_variant(regressor: str) -> bool:
     """Whether a row is of another estimator, features or method than the configured ones.
 
-    GR with the person's neutral (`GR/neutral`) is none: it is the same regressor, told more.
+    A regressor told a neutral (`GR/neutral`) is none: it is the same, told more.
     """
     return regressor.partition("/")[2] not in ("", "neutral")
 

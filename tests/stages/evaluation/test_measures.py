@@ -26,7 +26,8 @@ def values(root, name, region="mouth", measure="vertex_error_mean_mm"):
 def test_corrections_are_between_the_base_and_the_oracle(scene):
     error = values(scene.root, "truth")
     assert set(error.index) == {
-        "base", "oracle", "contour", "PS-ana", "MS", "GR-ana", "GR-ana/neutral",
+        "base", "oracle", "contour", "PS-ana", "MS", "GR-ana",
+        "PS-ana/neutral", "MS/neutral", "GR-ana/neutral",
         *(f"MS/{variant}" for variant in ("rbf", "affine", "shape-only", "distances-only")),
     }  # fmt: skip
     assert error["oracle"] < 0.7 * error["base"]
