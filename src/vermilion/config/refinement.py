@@ -14,15 +14,15 @@ Counts = Annotated[list[Annotated[int, Field(ge=0, le=50)]], Field(min_length=1,
 class AppearanceConfig(StageConfig):
     """Lighting and albedo of a take, from a few frames that are chosen by themselves."""
 
-    frames: int = Field(10, ge=1, le=200, description="Frames that are chosen (count).")
+    frames: int = Field(20, ge=1, le=200, description="Frames that are chosen (count).")
     rounds: int = Field(
-        2, ge=0, le=20, description="Turns of appearance and of the chosen frames' pose (count)."
+        5, ge=0, le=20, description="Turns of appearance and of the chosen frames' pose (count)."
     )
     spacing_mm: float = Field(
         2.2, ge=0.5, le=20, description="Between places where model and picture are compared (mm)."
     )
     pixel_mm: float = Field(
-        1.0,
+        0.5,
         ge=0.1,
         le=20,
         description="Pixel of the finest picture that is compared (mm at the face).",
@@ -45,7 +45,7 @@ class PhotometricConfig(StageConfig):
         2.0, gt=0.1, le=100, description="A place this far off counts half (deviations)."
     )
     strength: float = Field(
-        1000.0, ge=0, le=1e6, description="How many independent places the whole face is worth."
+        4000.0, ge=0, le=1e6, description="How many independent places the whole face is worth."
     )
     rotation_deg: float = Field(
         3.0, gt=0, le=180, description="Typical turn from the landmark fit (degrees)."
@@ -71,7 +71,7 @@ class JoinConfig(StageConfig):
     """The refined frames of a take as one track."""
 
     weight_acceleration: float = Field(
-        30.0,
+        20.0,
         gt=0,
         le=1e9,
         description="Typical acceleration of a blend weight (per second squared); smaller is "
