@@ -43,7 +43,7 @@ class PhotometricSettings:
 
     sigma: float = 6.0
     robust_sigmas: float = 2.0
-    strength: float = 1000.0
+    strength: float = 4000.0
     rotation_deg: float = 3.0
     translation_mm: float = 5.0
     depth_mm: float = 10.0
