@@ -30,11 +30,10 @@ def main(snakemake):
     samples = sample_skin(start.model, options["spacing_mm"])
     face, source = start.face(samples), open_frames(snakemake.params.source, *place)
     settings = PhotometricSettings(**cfg["refinement.fit"])
-    pictures = [source.read(fit.camera.name, int(fit.frames[row])) for row in rows]
-    views = [
-        start.view(row, picture, face, options["pixel_mm"], len(settings.iterations))
-        for row, picture in zip(rows, pictures, strict=True)
-    ]
+    views = []
+    for row in rows:  # one whole picture in memory at a time
+        picture = source.read(fit.camera.name, int(fit.frames[row]))
+        views.append(start.view(row, picture, face, options["pixel_mm"], len(settings.iterations)))
     appearance = learn_appearance(
         fit.frames[rows], views, face, samples, options["albedo_prior"], options["rounds"],
         lambda found: FrameProblem(face, found, settings, start.settings.weight_sigma),
@@ -43,7 +42,12 @@ def main(snakemake):
     print(f"frames {appearance.frames}, light {light}, spread {np.median(appearance.spread):.2f}")
     write_srgb8(
         snakemake.output.overlay,
-        appearance_picture(pictures[0], start, start.x[rows[0]], appearance),
+        appearance_picture(
+            source.read(fit.camera.name, int(fit.frames[rows[0]])),
+            start,
+            start.x[rows[0]],
+            appearance,
+        ),
     )
     appearance.save(snakemake.output.appearance)
 
