@@ -71,7 +71,7 @@ class JoinConfig(StageConfig):
     """The refined frames of a take as one track."""
 
     weight_acceleration: float = Field(
-        20.0,
+        15.0,
         gt=0,
         le=1e9,
         description="Typical acceleration of a blend weight (per second squared); smaller is "
