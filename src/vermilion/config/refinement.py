@@ -77,6 +77,13 @@ class JoinConfig(StageConfig):
         description="Typical acceleration of a blend weight (per second squared); smaller is "
         "smoother.",
     )
+    translation_acceleration_mm: float = Field(
+        200.0,
+        gt=0,
+        le=1e9,
+        description="Typical acceleration of a head (mm per second squared); smaller is smoother, of its "
+        "depth above all, which pictures tell least of.",
+    )
 
 
 class LayerConfig(StageConfig):
