@@ -67,7 +67,17 @@ def test_change_after_the_job_is_not_recorded_as_good(results):
     os.utime(results / "a.npy", (late, late))
     refused = record(results, outputs(results), ends.get)
     assert [d.path.name for d in refused] == ["a.npy"]
+    assert "make verify" in refused[0].reason
     assert [d.path.name for d in find_damage(results)] == ["a.npy"]
+
+
+def test_output_of_a_job_that_was_cut_off_is_not_recorded_and_called_so(results):
+    ends = {results / "folder": ended(results / "folder")}
+    refused = record(results, outputs(results), ends.get)
+    assert [d.path.name for d in refused] == ["a.npy"]
+    assert "cut off" in refused[0].reason and "verify" not in refused[0].reason
+    os.truncate(results / "a.npy", 10)
+    assert find_damage(results) == []
 
 
 def test_rerun_output_is_recorded_anew(results):

@@ -197,7 +197,4 @@ def record_checksums():
                 ends[path] = getattr(workflow.persistence.metadata(output), "endtime", None)
     refused = checksums.record(Path(R), jobs, ends.get)
     for damage in refused:
-        print(
-            f"not to be trusted: {damage.path} ({damage.reason}); run `make verify`",
-            file=sys.stderr,
-        )
+        print(f"not to be trusted: {damage.path}: {damage.reason}", file=sys.stderr)

@@ -22,6 +22,9 @@ LEDGER = "checksums.tsv"
 COLUMNS = ("path", "bytes", "mtime_ns", "sha256", "output", "job")
 #: Two clocks and a file system's rounding lie between a file's time and its job's recorded end.
 CLOCK_SLACK_S = 0.05
+#: Why a file is not recorded.
+CHANGED = "changed after its job had ended: run `make verify`"
+CUT_OFF = "its job was cut off: the next run makes it again"
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def record(
                     "job": job.relative_to(results).as_posix(),
                 }
             else:
-                refused.append(Damage(path, "changed after its job had ended"))
+                refused.append(Damage(path, CHANGED if end is not None else CUT_OFF))
                 if entry:
                     entries[name] = entry
     rows = [{"path": name, **entries[name]} for name in sorted(entries)]
