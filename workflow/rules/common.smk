@@ -188,6 +188,8 @@ def record_checksums():
     """Write the ledger of checksums for every output whose job has ended."""
     if not IS_MAIN_PROCESS or workflow.dryrun:
         return
+    # Snakemake may have read the record of its last job before it was written, and keeps what it read.
+    workflow.persistence.deactivate_cache()
     jobs, ends = {}, {}
     for job in workflow.dag.jobs:
         for output in job.output:
