@@ -9,7 +9,8 @@ sees the true mesh. Contours are looked for from **C** of the run, in the head f
 does, or from the landmarks' curves where the take is not yet tracked, in the maps of
 
 - `boosted`: boosted edge learning, trained anew on the take's labelled frames but those measured;
-- `landmarks`: the landmarks' curves moved to the border of the lips' colour.
+- `track`: the tracked lips moved to the border of the lips' colour, learnt from the take;
+- `landmarks`: the landmarks' curves moved there.
 
 Prints, for each and for each kind of mouth, the mean distance between found and true contour in
 pixels at a mouth width of 120 px, the 95th percentile over frames, and the share of failures: frames
@@ -27,13 +28,18 @@ import numpy as np
 import pandas as pd
 
 from vermilion.camera import read_cameras
+from vermilion.config.contours import TrackRidgeConfig
+from vermilion.contours.curves import loop_spline
 from vermilion.contours.labels import label_paths, read_label
-from vermilion.contours.landmark_ridge import LandmarkRidgeDetector, loop_spline
+from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+from vermilion.contours.maps import evenly
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
 from vermilion.evaluation.contour_error import distance_to_polyline
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
 from vermilion.features.search import SearchSettings, find_inner, find_outer
+from vermilion.features.tracked_lips import TrackedLips
 from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER, interocular_px
@@ -101,15 +107,33 @@ class Found:
     inner_found: np.ndarray
 
 
-def finder(results: Path, take: str, track: LandmarkTrack, camera):
+def read_track(results: Path, take: str) -> tuple[FaceModel, TrackedTake, np.ndarray] | None:
+    """The tracker's model, poses and meshes (F, V, 3); None where the take is not yet tracked."""
+    folder = results / "takes" / take / "tracking"
+    if not (folder / "C").is_dir():
+        return None
+    meshes = [read_sequence(path) for path in sorted((folder / "C").glob("*.npy"))]
+    model = FaceModel.load(results / "face/tracker.npz")
+    return model, TrackedTake.load(folder / "fit.npz"), np.concatenate(meshes)
+
+
+def learnt(source, track: LandmarkTrack, rings, camera) -> TrackRidgeDetector:
+    """The detector that the take itself tells; `rings` (frame) -> tracked lips."""
+    section, detector = TrackRidgeConfig(), TrackRidgeDetector()
+    frames = sorted(evenly(np.flatnonzero(track.valid).tolist(), section.frames))
+    regions = [detector.region(track.points_px[f], rings(f)) for f in frames]
+    pictures = [
+        region.crop(source.read(camera.name, f)) for f, region in zip(frames, regions, strict=True)
+    ]
+    return learn_borders(detector, pictures, regions, section.reach)
+
+
+def finder(tracked, track: LandmarkTrack, camera):
     """A function (frame, maps) -> contours."""
-    folder, settings = results / "takes" / take, SearchSettings()
-    if (folder / "tracking/C").is_dir():
-        fit = TrackedTake.load(folder / "tracking/fit.npz")
-        coarse = np.concatenate(
-            [read_sequence(p) for p in sorted((folder / "tracking/C").glob("*.npy"))]
-        )
-        sampler = ContourSampler.of(FaceModel.load(results / "face/tracker.npz"), 80, settings)
+    settings = SearchSettings()
+    if tracked:
+        model, fit, coarse = tracked
+        sampler = ContourSampler.of(model, 80, settings)
         turns, places = fit.world_from_head_rotation, fit.world_from_head_translation_mm
         return lambda f, maps: sampler.find(coarse[f], camera, maps, (turns[f], places[f]))
 
@@ -131,7 +155,8 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     track = LandmarkTrack.load(sorted((folder / "landmarks").glob("0*.npz")))
     source = open_frames(capture)
     (camera,) = read_cameras(capture / "cameras").values()
-    find = finder(results, take, track, camera)
+    tracked = read_track(results, take)
+    find = finder(tracked, track, camera)
     true_mm = np.load(truth / "vertices_mm.npy", mmap_mode="r")
     loops = true_contours(FaceModel.load(results / "face/studio.npz"), true_mm, camera)
     kinds = kinds_of(loops)
@@ -144,6 +169,11 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     detectors = {"landmarks": LandmarkRidgeDetector()}
     if labelled:
         detectors["boosted"] = train_detector(labelled, TrainingSettings())
+    rings = dict.fromkeys(range(len(true_mm)))
+    if tracked:
+        lips = TrackedLips.of(tracked[0])
+        rings = {f: lips.rings_px(mesh, camera) for f, mesh in enumerate(tracked[2])}
+        detectors["track"] = learnt(source, track, rings.__getitem__, camera)
     rows = []
     for frame in range(0, len(true_mm), every):
         if frame in labels:
@@ -153,7 +183,7 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
             row = {"detector": name, "frame": frame, "kind": kinds[frame], "failed": True}
             if picture is not None:
                 start = time.process_time()
-                maps = detector.likelihood(picture, track.points_px[frame])
+                maps = detector.likelihood(picture, track.points_px[frame], rings[frame])
                 row["maps_cpu_s"] = time.process_time() - start
                 found = find(frame, maps)
                 row |= distances(found, loops[frame], width_px)

@@ -27,8 +27,9 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from vermilion.contours import training
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
+from vermilion.contours.curves import loop_spline
 from vermilion.contours.labels import CONTOURS, label_paths, read_label
-from vermilion.contours.landmark_ridge import LandmarkRidgeDetector, loop_spline
+from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector

@@ -186,20 +186,65 @@ def test_chunks_change_nothing(take):
     np.testing.assert_array_equal(part.inner_px, whole.inner_px[2:4])
 
 
-def test_without_labels_auto_falls_back_and_boosted_says_what_is_missing(take, tmp_path):
+def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(take, tmp_path):
     from vermilion.contours.detector import load_detector
     from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+    from vermilion.contours.track_ridge import TrackRidgeDetector
     from vermilion.errors import InputError
 
     root, params = take
-    job = {
-        "wildcards": NAME,
-        "input": {"landmarks": [root / "landmarks.npz"]},
-        "output": {"detector": tmp_path / "detector.npz"},
+    track = {
+        "landmarks": [root / "landmarks.npz"],
+        "tracker": root / "tracker.npz",
+        "fit": root / "fit.npz",
+        "coarse": [root / "000000-000004/C.npy"],
     }
+    job = {"wildcards": NAME, "output": {"detector": tmp_path / "detector.npz"}}
     bare = {**params, "capture": str(tmp_path)}
-    run_script("contour_detector", params=bare, **job)
+    run_script("contour_detector", params=bare, input=track, **job)
+    assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
+    run_script(
+        "contours",
+        wildcards=NAME,
+        params=bare,
+        input={**track, "landmarks": track["landmarks"][0], "detector": tmp_path / "detector.npz"},
+        output={
+            "maps": tmp_path / "maps",
+            "quality": tmp_path / "quality.tsv",
+            "overlay": tmp_path / "overlay.png",
+        },
+    )
+    _, outer = read_maps(tmp_path / "maps/000003.exr")
+    line = draw_mouth(*SHAPES[3])[2].outer.points_px
+    on_line = outer[tuple(np.floor(line[5:55, ::-1]).astype(int).T)]
+    assert on_line.mean() > 0.5 * outer.max()
+    plain = {"cfg": {"contours.detector": {"kind": "landmarks"}}}
+    run_script("contour_detector", params={**bare, **plain}, input=track, **job)
     assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)
     demanding = {**bare, "cfg": {"contours.detector": {"kind": "boosted"}}}
     with pytest.raises(InputError, match="no usable contour labels"):
-        run_script("contour_detector", params=demanding, **job)
+        run_script("contour_detector", params=demanding, input=track, **job)
+
+
+def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_path):
+    from vermilion.contours.detector import load_detector
+    from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+
+    root, params = take
+    for frame in FRAMES:
+        path = tmp_path / f"frames/cam/{frame:06d}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"no picture")
+    run_script(
+        "contour_detector",
+        wildcards=NAME,
+        params={**params, "capture": str(tmp_path), "source": str(tmp_path)},
+        input={
+            "landmarks": [root / "landmarks.npz"],
+            "tracker": root / "tracker.npz",
+            "fit": root / "fit.npz",
+            "coarse": [root / "000000-000004/C.npy"],
+        },
+        output={"detector": tmp_path / "detector.npz"},
+    )
+    assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)

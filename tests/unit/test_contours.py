@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 from tests.unit.mouths import draw_mouth
 from vermilion.contours.boosting import BoostingSettings, bin_edges, fit_forest
 from vermilion.contours.channels import LEVELS, PAD, image_channels, integral_images
+from vermilion.contours.curves import loop_spline
 from vermilion.contours.detector import load_detector
 from vermilion.contours.labels import contact_lines, dark_valley, read_label
-from vermilion.contours.landmark_ridge import LandmarkRidgeDetector, loop_spline
+from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.paths import cheapest_ring
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region

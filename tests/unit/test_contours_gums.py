@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.mouths import draw_mouth
-from vermilion.contours import landmark_ridge
+from vermilion.contours import ridges
 from vermilion.contours.gums import creases, flesh_plane
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.images import srgb_to_linear
@@ -64,9 +64,7 @@ def test_nothing_changes_without_gums(opening, monkeypatch):
     if opening > 20:
         picture, landmarks, _ = draw_teeth(gums=False)
     found = LandmarkRidgeDetector().likelihood(picture, landmarks)
-    monkeypatch.setattr(
-        landmark_ridge, "creases", lambda lightness, *_: (np.zeros(lightness.shape),) * 2
-    )
+    monkeypatch.setattr(ridges, "creases", lambda lightness, *_: (np.zeros(lightness.shape),) * 2)
     without = LandmarkRidgeDetector().likelihood(picture, landmarks)
     # but for the mouth's corners, where lips touch
     changed = np.abs(np.subtract(found, without))[:, :, 90:150]

@@ -15,9 +15,30 @@ def contour_labels(wildcards):
     return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
 
 
+def by_track(wildcards):
+    """Whether a take's contours are looked for from its tracked lips."""
+    kind = CONFIG.contours.detector.kind
+    return kind == "track" or (kind == "auto" and not contour_labels(wildcards))
+
+
+def tracked_lips(wildcards):
+    """The track of a take whose contours start from it: of the job's chunk, or of all."""
+    if not by_track(wildcards):
+        return {}
+    subject, take = wildcards.subject, wildcards.take
+    parts = [wildcards.chunk] if "chunk" in wildcards.keys() else chunks(subject, take)
+    folder = f"{R}/takes/{subject}/{take}/tracking"
+    return {
+        "tracker": tracker_of(wildcards),
+        "fit": f"{folder}/fit.npz",
+        "coarse": [f"{folder}/C/{chunk}.npy" for chunk in parts],
+    }
+
+
 rule contour_detector:
     """Trains the inner and outer contour detectors of a take: contours/detector.npz."""
     input:
+        unpack(tracked_lips),
         pictures=mono_pictures,
         landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         labels=contour_labels,
@@ -44,6 +65,7 @@ rule contours:
     """Draws the likelihood maps of a chunk: contours/{chunk}/<frame>.exr, inner and outer."""
     input:
         unpack(mono_inputs),
+        unpack(tracked_lips),
         landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
         detector=R + "/takes/{subject}/{take}/contours/detector.npz",
     output:

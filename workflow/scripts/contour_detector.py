@@ -1,30 +1,83 @@
-"""Contour detectors of a take's illumination, trained on its labelled frames (Lips16 3.2.2)."""
+"""Contour detectors of a take: trained on its labelled frames, or learnt along its tracked lips."""
+
+import numpy as np
 
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+from vermilion.contours.maps import evenly
+from vermilion.contours.region import usable
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
 from vermilion.contours.training import TrainingSettings, read_labelled, train_detector
+from vermilion.errors import InputError
+from vermilion.faces.model import FaceModel
+from vermilion.features.tracked_lips import TrackedLips
 from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
+from vermilion.progress import progress
+from vermilion.sequences import read_sequence
+from vermilion.tracking.result import TrackedTake
+
+
+def from_track(snakemake, cfg, source, track):
+    """The detector that a take's own pictures and track tell; None where no frame serves."""
+    options, inputs = cfg.track, snakemake.input
+    fit = TrackedTake.load(inputs.fit)
+    lips = TrackedLips.of(FaceModel.load(inputs.tracker))
+    # Along the take's frames, so that they are not all of its first chunk.
+    coarse = np.concatenate([read_sequence(path) for path in inputs.coarse])
+    tracked = dict(zip(fit.frames.tolist(), fit.valid, strict=True))
+    valid = [
+        f
+        for f, good in zip(track.frames.tolist(), track.valid, strict=True)
+        if good and tracked.get(f)
+    ]
+    detector = TrackRidgeDetector(
+        cfg.interocular_size_px,
+        cfg.margin,
+        cfg.ridge_width,
+        options.inner_reach,
+        cfg.edge_weight,
+        cfg.stiffness,
+        options.frame_reach,
+    )
+    pictures, regions = [], []
+    for frame in progress(sorted(evenly(valid, options.frames)), "frames that tell the lips"):
+        points = track.points_px[track.frames.tolist().index(frame)]
+        try:
+            picture = source.read(snakemake.params.camera, frame)
+        except InputError:
+            continue  # the frame is flagged where its maps are drawn
+        if usable(points, picture.shape):
+            continue
+        rings = lips.rings_px(coarse[int(fit.index_of([frame])[0])], fit.camera)
+        regions.append(detector.region(points, rings))
+        pictures.append(regions[-1].crop(picture))
+    if not pictures:
+        return None
+    return learn_borders(detector, pictures, regions, options.reach)
 
 
 def main(snakemake) -> None:
     cfg = ContourDetectorConfig(**snakemake.params.cfg["contours.detector"])
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     source = open_frames(snakemake.params.source, **place)
-    labelled = []
-    if cfg.kind != "landmarks":
+    track = LandmarkTrack.load(snakemake.input.landmarks)
+    labelled, detector = [], None
+    if cfg.kind in ("auto", "boosted"):
         labelled = read_labelled(
             snakemake.params.capture,
             snakemake.params.camera,
             source,
-            LandmarkTrack.load(snakemake.input.landmarks),
+            track,
             required=cfg.kind == "boosted",
             **place,
         )
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
-    else:
+    elif cfg.kind != "landmarks":
+        detector = from_track(snakemake, cfg, source, track)
+    if detector is None:
         detector = LandmarkRidgeDetector(
             cfg.interocular_size_px,
             cfg.margin,

@@ -4,6 +4,8 @@ from vermilion.config.contours import ContourMapsConfig
 from vermilion.contours.detector import load_detector
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.maps import evenly, frame_maps, maps_overlay, sheet, write_maps
+from vermilion.faces.model import FaceModel
+from vermilion.features.tracked_lips import TrackedLips
 from vermilion.files import atomic_folder
 from vermilion.frames import open_frames
 from vermilion.images import write_srgb8
@@ -11,6 +13,8 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.progress import progress
 from vermilion.quality import write_quality
+from vermilion.sequences import read_sequence
+from vermilion.tracking.result import TrackedTake
 
 
 def main(snakemake) -> None:
@@ -20,6 +24,11 @@ def main(snakemake) -> None:
     detector = load_detector(snakemake.input.detector)
     track = LandmarkTrack.load(snakemake.input.landmarks)
     labels = label_paths(snakemake.params.capture, snakemake.params.camera)
+    coarse = lips = camera = None
+    if detector.from_track:
+        coarse = read_sequence(snakemake.input.coarse[0])
+        lips = TrackedLips.of(FaceModel.load(snakemake.input.tracker))
+        camera = TrackedTake.load(snakemake.input.fit).camera
     shown = evenly(track.frames.tolist(), cfg.overlay_frames)
     rows, pictures = [], []
     with atomic_folder(snakemake.output.maps) as folder:
@@ -33,6 +42,7 @@ def main(snakemake) -> None:
                 bool(track.valid[index]),
                 detector,
                 cfg.least_peak,
+                lips.rings_px(coarse[index], camera) if lips else None,
             )
             rows.append(row)
             if maps is None:

@@ -26,14 +26,38 @@ class BoostingConfig(StageConfig):
     )
 
 
-class ContourDetectorConfig(StageConfig):
-    """How contours are found: by detectors trained on labelled frames, or from landmarks."""
+class TrackRidgeConfig(StageConfig):
+    """Ridges near the tracked lips (`kind: track`). Lengths are per inter-ocular distance."""
 
-    kind: Literal["auto", "boosted", "landmarks"] = Field(
+    frames: int = Field(
+        20, ge=1, le=500, description="Frames of a take that tell its lips, evenly spread (count)."
+    )
+    reach: float = Field(
+        0.08,
+        gt=0,
+        le=0.3,
+        description="How far from the tracked one the take's outer border is looked for.",
+    )
+    frame_reach: float = Field(
+        0.02,
+        gt=0,
+        le=0.2,
+        description="How far from the take's outer border a frame's may lie; half as far again at most.",
+    )
+    inner_reach: float = Field(
+        0.05, gt=0, le=0.3, description="How far from where it lies on average the inner border is."
+    )
+
+
+class ContourDetectorConfig(StageConfig):
+    """How contours are found: by detectors trained on labelled frames, or near the track."""
+
+    kind: Literal["auto", "boosted", "track", "landmarks"] = Field(
         "auto",
-        description="`boosted`: edge learning, trained on the take's labelled frames. `landmarks`: "
-        "ridges at the border of the lips' colour near the landmarks. `auto`: boosted where the take has "
-        "labelled frames in the monocular camera, else landmarks.",
+        description="`boosted`: edge learning, trained on the take's labelled frames. `track`: ridges at "
+        "the border of the lips' colour near the tracked lips, learnt from frames of the whole take. "
+        "`landmarks`: the same near the landmarks, each frame by itself. `auto`: boosted where the take has "
+        "labelled frames in the monocular camera, else track.",
     )
     interocular_size_px: float = Field(
         200.0,
@@ -78,7 +102,7 @@ class ContourDetectorConfig(StageConfig):
         0.008,
         gt=0,
         le=0.2,
-        description="`landmarks`: deviation of the ridges (per inter-ocular distance).",
+        description="`track`, `landmarks`: deviation of the ridges (per inter-ocular distance).",
     )
     ridge_reach: float = Field(
         0.08,
@@ -90,13 +114,17 @@ class ContourDetectorConfig(StageConfig):
     edge_weight: float = Field(
         4.0,
         ge=0,
-        description="`landmarks`: worth of the strongest edge against a border one reach away from "
-        "the landmarks; 0 draws the landmarks alone.",
+        description="`track`, `landmarks`: worth of the strongest edge against a border one reach away "
+        "from where it is looked for; 0 draws the start alone.",
     )
     stiffness: float = Field(
         6.0,
         ge=0,
-        description="`landmarks`: cost of a slope of 1 between the border and the landmarks' curve.",
+        description="`track`, `landmarks`: cost of a slope of 1 between the border and where it is looked "
+        "for.",
+    )
+    track: TrackRidgeConfig = Field(
+        default_factory=TrackRidgeConfig, description="Ridges near the tracked lips."
     )
     boosting: BoostingConfig = Field(
         default_factory=BoostingConfig, description="Boosted trees of the detectors."

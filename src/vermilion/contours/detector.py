@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -30,17 +31,30 @@ class ContourDetector(ABC):
 
     interocular_size_px: float
     margin: float
+    #: Whether it starts from the lips of the track, and not from the landmarks'.
+    from_track: ClassVar[bool] = False
+
+    def region(
+        self, landmarks_px: np.ndarray, lips_px: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> MouthRegion:
+        """The mouth's region of a frame, with the rings that the detector starts from."""
+        lips = lips_px if self.from_track else None
+        return mouth_region(landmarks_px, self.interocular_size_px, self.margin, lips_px=lips)
 
     def likelihood(
-        self, linear_rgb: np.ndarray, landmarks_px: np.ndarray
+        self,
+        linear_rgb: np.ndarray,
+        landmarks_px: np.ndarray,
+        lips_px: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Likelihood maps (inner, outer), both (h, w) float32 in [0, 1], zero far from the mouth.
 
         Args:
             linear_rgb: (h, w, 3) float32.
             landmarks_px: (66, 2) of the face in it.
+            lips_px: rings (n, 2), outer and inner, of the tracked lips (`features.tracked_lips`).
         """
-        region = mouth_region(landmarks_px, self.interocular_size_px, self.margin)
+        region = self.region(landmarks_px, lips_px)
         maps = self.region_likelihood(region.crop(linear_rgb), region)
         inner, outer = (region.paste(maps[name], linear_rgb.shape[:2]) for name in CONTOURS)
         return inner, outer
@@ -129,11 +143,13 @@ def save_arrays(path: str | Path, arrays: dict) -> None:
 
 
 def load_detector(path: str | Path) -> ContourDetector:
-    """Read a detector of either kind. Raises ModelFileError on a damaged or newer file."""
+    """Read a detector of any kind. Raises ModelFileError on a damaged or newer file."""
     from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+    from vermilion.contours.track_ridge import TrackRidgeDetector
 
     kinds = {
         "boosted": BoostedDetector.from_arrays,
+        "track": TrackRidgeDetector.from_arrays,
         "landmarks": LandmarkRidgeDetector.from_arrays,
     }
     expected = f"a contour detector of format {FORMAT_VERSION}"

@@ -47,10 +47,12 @@ def frame_maps(
     landmarks_valid: bool,
     detector: ContourDetector,
     least_peak: float,
+    lips_px: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, np.ndarray | None, QualityRow]:
     """Maps of one frame: ((inner, outer) or None, the picture or None, what is to be said of it).
 
-    A frame that cannot be read, or has no face, has no maps and an invalid row.
+    A frame that cannot be read, or has no face, has no maps and an invalid row. `lips_px`: rings
+    (n, 2), outer and inner, of the tracked lips, for a detector that starts from them.
     """
     try:
         picture = source.read(camera, frame)
@@ -59,7 +61,7 @@ def frame_maps(
     reason = usable(landmarks_px, picture.shape) if landmarks_valid else "no landmarks"
     if reason:
         return None, picture, QualityRow(frame, False, reason)
-    inner, outer = detector.likelihood(picture, landmarks_px)
+    inner, outer = detector.likelihood(picture, landmarks_px, lips_px)
     figures = {
         "inner_peak": peak(inner),
         "outer_peak": peak(outer),

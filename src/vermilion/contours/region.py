@@ -21,7 +21,7 @@ class MouthRegion:
         image_from_region: (2, 3) similarity, region pixels to image pixels (both with the centre
             of the top-left pixel at (0.5, 0.5)).
         size_px: side of the region in its own pixels.
-        outer_px, inner_px: (n, 2) the landmarks' lip loops in the region.
+        outer_px, inner_px: (n, 2) loops about the lips in the region: the landmarks', or given ones.
         mask: (size, size) bool, pixels near enough to the mouth to be looked at.
     """
 
@@ -90,6 +90,7 @@ def mouth_region(
     interocular_size_px: float,
     margin: float,
     jitter: np.ndarray | None = None,
+    lips_px: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> MouthRegion:
     """The region of a face with landmarks (66, 2).
 
@@ -99,6 +100,7 @@ def mouth_region(
         margin: width of the band round the landmarks' mouth that is looked at, per
             inter-ocular distance.
         jitter: (2, 2) matrix applied to the region about its centre, to vary training samples.
+        lips_px: rings (n, 2), outer and inner, in place of the landmarks' loops.
     """
     landmarks = np.asarray(landmarks_px, dtype=np.float64)
     across = landmarks[EYE_CORNERS[1]] - landmarks[EYE_CORNERS[0]]
@@ -112,8 +114,8 @@ def mouth_region(
     size = round(SIDE * interocular_size_px)
     image_from_region = np.column_stack([linear, centre - linear @ np.full(2, size / 2)])
     inverse = cv2.invertAffineTransform(image_from_region)
-    outer = apply_affine(inverse, landmarks[LIP_OUTER])
-    inner = apply_affine(inverse, landmarks[LIP_INNER])
+    loops = (landmarks[LIP_OUTER], landmarks[LIP_INNER]) if lips_px is None else lips_px
+    outer, inner = (apply_affine(inverse, loop) for loop in loops)
     mask = _near(outer, size, margin * interocular_size_px)
     return MouthRegion(image_from_region, size, outer, inner, mask)
 

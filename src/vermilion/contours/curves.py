@@ -1,0 +1,64 @@
+"""Closed curves in a region's pixels, and what lies on them and inside."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+
+def loop_spline(loop_px: np.ndarray, n_points: int = 240) -> np.ndarray:
+    """Closed curve through a loop of landmarks (n, 2), (n_points, 2); sharp at the mouth corners.
+
+    The first point and the one farthest from it (the other corner, as the 66-point scheme has
+    them) are where the upper and the lower half meet.
+    """
+    half = int(np.argmax(np.linalg.norm(loop_px - loop_px[0], axis=1)))
+    halves = []
+    for part in (loop_px[: half + 1], np.concatenate([loop_px[half:], loop_px[:1]])):
+        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
+        along += np.arange(len(along)) * 1e-6  # landmarks may coincide
+        places = np.linspace(0, along[-1], n_points // 2, endpoint=False)
+        halves.append(CubicSpline(along, part)(places))
+    return np.concatenate(halves)
+
+
+def gap(curve: np.ndarray) -> np.ndarray:
+    """Distance (n,) of each point of a closed curve to the half that it does not belong to."""
+    half = len(curve) // 2
+    parts = curve[: half + 1], np.concatenate([curve[half:], curve[:1]])
+    away = [cKDTree(other).query(part)[0] for part, other in (parts, parts[::-1])]
+    return np.concatenate([part[:-1] for part in away])
+
+
+def sampled(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Bilinear values (n, m) of a plane (h, w) at points (n, m, 2)."""
+    x, y = (np.ascontiguousarray(points[..., k] - 0.5, dtype=np.float32) for k in range(2))
+    found = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return found.astype(np.float64)
+
+
+def outward_normals(curve: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 2) of a closed curve of many points."""
+    tangent = np.roll(curve, -4, axis=0) - np.roll(curve, 4, axis=0)
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    following = np.roll(curve, -1, axis=0)
+    area = np.sum(curve[:, 0] * following[:, 1] - curve[:, 1] * following[:, 0])
+    return normal if area > 0 else -normal
+
+
+def drawn(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Inside of a closed curve (size, size) bool, and the distance to it to a pixel."""
+    away = np.ones((size, size), dtype=np.uint8)
+    cv2.polylines(away, [np.rint(curve - 0.5).astype(np.int32)], True, 0)
+    distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return filled(curve, size), distance
+
+
+def filled(curve: np.ndarray, size: int) -> np.ndarray:
+    """Inside of a closed curve (size, size) bool."""
+    inside = np.zeros((size, size), dtype=np.uint8)
+    cv2.fillPoly(inside, [np.rint(curve - 0.5).astype(np.int32)], 1)
+    return inside > 0

@@ -1,0 +1,59 @@
+"""What tells lips from what lies beside them in one picture: planes of a region."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from vermilion.contours.curves import drawn
+from vermilion.contours.gums import flesh_plane
+from vermilion.contours.region import SIDE
+
+LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade above it allows
+LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
+
+
+def lip_planes(
+    colours: np.ndarray, curves: dict[str, np.ndarray], band: tuple[float, float], tolerance: float
+) -> dict[str, np.ndarray]:
+    """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
+
+    `outer`: probability of lip against skin, of two normal distributions with one covariance
+    (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
+    the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
+    What is lip, the `curves` (n, 2) of both contours and the band of the pass say.
+    """
+    size = colours.shape[1]
+    inside, to_outer = drawn(curves["outer"], size)
+    opening, to_inner = drawn(curves["inner"], size)
+    ratio = to_outer / np.maximum(to_outer + to_inner, 1e-9)
+    lip = inside & ~opening & (ratio > band[0]) & (ratio < band[1])
+    scale = size / SIDE
+    skin = ~inside & (to_outer > 0.05 * scale) & (to_outer < 0.12 * scale)
+    if lip.sum() < 20 or skin.sum() < 20:
+        return {name: np.zeros_like(colours[0]) for name in ("inner", "outer", "flesh")}
+    lips, skins = colours[:, lip].T.astype(np.float64), colours[:, skin].T.astype(np.float64)
+    own = _covariance(lips)
+    shared = 0.5 * (own + _covariance(skins))
+    spread = own + LEAST_SPREAD**2 * np.eye(3)
+    direction = np.linalg.solve(shared, lips.mean(axis=0) - skins.mean(axis=0))
+    middle = 0.5 * (lips.mean(axis=0) + skins.mean(axis=0))
+    log_odds = np.tensordot(direction, colours - middle[:, None, None], axes=1)
+    away = colours.reshape(3, -1).T - lips.mean(axis=0)
+    squared = np.einsum("nk,kl,nl->n", away, np.linalg.inv(spread), away).reshape(size, size)
+    return {
+        "outer": (1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))).astype(np.float32),
+        "inner": (1.0 - np.exp(-squared / tolerance)).astype(np.float32),
+        "flesh": flesh_plane(colours, lip),
+    }
+
+
+def dark_lines(lightness: np.ndarray) -> np.ndarray:
+    """How much darker a place (size, size) is than what lies beside it; zero where it is not."""
+    blurred = ((scale, cv2.GaussianBlur(lightness, (0, 0), scale)) for scale in LINE_PX)
+    found = [scale**2 * cv2.Laplacian(plane, cv2.CV_32F) for scale, plane in blurred]
+    return np.maximum(np.maximum(*found), 0.0)
+
+
+def _covariance(samples: np.ndarray) -> np.ndarray:
+    return np.cov(samples.T) + 1e-5 * np.eye(samples.shape[1])

@@ -1,0 +1,178 @@
+"""Ridges about borders of the lips that are found in a picture from curves near them.
+
+A curve is moved to the border of the lips' colour as one smooth ring near where it began, and a ridge
+is drawn about it. What is lip-coloured is learnt in each frame by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import ClassVar, Self
+
+import cv2
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vermilion.contours.channels import image_channels
+from vermilion.contours.curves import gap, outward_normals, sampled
+from vermilion.contours.detector import FORMAT_VERSION, ContourDetector, save_arrays
+from vermilion.contours.gums import creases
+from vermilion.contours.paths import cheapest_ring
+from vermilion.contours.region import MouthRegion
+
+BLUR_PX = 1.0  # of the colours
+CONTACT = 0.03  # a mouth open by less may be closed: per inter-ocular distance
+LINE_SHARE = 0.7  # what the dark line counts there, against the fall
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One search for the borders.
+
+    Attributes:
+        band: where lips are sure to be, from the outer (0) to the inner (1) border.
+        tolerance: squared deviations from the lips' colour at which a colour is 63 % strange.
+        outer_reach: of the search for the outer border about the last one found, per the detector's.
+        inner_reach: of the search for the inner border. A whole reach starts at the landmarks, a
+            part at the border found before.
+        step_px: between the places along a normal, region pixels.
+    """
+
+    band: tuple[float, float]
+    tolerance: float
+    outer_reach: float
+    inner_reach: float
+    step_px: float
+
+
+#: First the middle of the lips, as landmarks may miss: those of the outer border by a whole lip, where
+#: gums are taken for one. Then all up to the dark of the opening, but
+#: strictly, as gums and tongue are nearly lip-coloured. Last leniently, so that the lips' own shade
+#: beside the opening does not count as opening, close to the borders that are known by then.
+PASSES = (
+    Pass((0.3, 0.7), 18.0, 1.5, 1.0, 0.5),
+    Pass((0.5, 0.95), 18.0, 1.0, 1.0, 0.5),
+    Pass((0.5, 0.95), 50.0, 0.3, 0.3, 0.25),
+)
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What else tells the inner border: (size, size) planes.
+
+    Attributes:
+        lightness: of the picture.
+        contact: dark lines, as where lips touch.
+        flesh: where the picture is lips, gums or tongue, 0 or 1.
+        lip: 1 inside the outer border.
+    """
+
+    lightness: np.ndarray
+    contact: np.ndarray
+    flesh: np.ndarray
+    lip: np.ndarray
+
+
+@dataclass(frozen=True)
+class RidgeDetector(ContourDetector):
+    """What the detectors share that draw ridges.
+
+    Attributes:
+        interocular_size_px: inter-ocular distance of the region that is looked at.
+        margin: of the region round the mouth, per inter-ocular distance.
+        width: deviation of the ridge, per inter-ocular distance.
+        reach: a border farther from the curve it is looked for from is not found, per inter-ocular
+            distance.
+        edge_weight: what the strongest edge is worth against the start; 0: the start alone.
+        stiffness: cost of a slope of 1 of the moved ring against the start, squared.
+    """
+
+    kind: ClassVar[str]
+
+    interocular_size_px: float = 200.0
+    margin: float = 0.16
+    width: float = 0.008
+    reach: float = 0.08
+    edge_weight: float = 4.0
+    stiffness: float = 6.0
+
+    def moved(
+        self,
+        curve: np.ndarray,
+        plane: np.ndarray,
+        reach_px: float,
+        step_px: float,
+        inside: Inside | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The curve on the strongest fall of `plane` near it, and the fall (n,) in [0, 1].
+
+        The inner one (with `inside`) also where lips touch or gums begin.
+        """
+        normals, count = outward_normals(curve), int(reach_px / step_px)
+        places = step_px * np.arange(-count, count + 1)
+        points = curve[:, None] + places[None, :, None] * normals[:, None]
+        fall = np.maximum(-np.gradient(sampled(plane, points), step_px, axis=1), 0.0)
+        fall = np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
+        if inside is not None:
+            near = np.exp(-((gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))[:, None]
+            line = sampled(inside.contact, points)
+            line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
+            fall += LINE_SHARE * near * (line - fall)
+            crease, beyond = self._creases(curve, normals, inside, step_px, count)
+            fall += (1.0 - near) * (crease - beyond * fall)
+        cost = (places / reach_px) ** 2 - self.edge_weight * fall
+        apart = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
+        chosen = cheapest_ring(cost, self.stiffness * (step_px / np.maximum(apart, step_px)) ** 2)
+        rows = np.arange(len(curve))
+        moved = curve + places[chosen][:, None] * normals
+        for _ in range(2):
+            moved = 0.25 * np.roll(moved, 1, axis=0) + 0.5 * moved + 0.25 * np.roll(moved, -1, 0)
+        return moved, np.minimum(fall[rows, chosen], 1.0)
+
+    def _creases(
+        self, curve: np.ndarray, normals: np.ndarray, inside: Inside, step_px: float, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`creases` at so many steps to either side of a curve.
+
+        They are looked for from one reach inside it to two outside it, as the landmarks may lie on the
+        far border of the gums.
+        """
+        reach = int(self.reach * self.interocular_size_px / step_px)
+        places = step_px * np.arange(-reach, 2 * reach + 1)
+        points = curve[:, None] + places[None, :, None] * normals[:, None]
+        lightness, flesh, lip = (
+            sampled(plane, points) for plane in (inside.lightness, inside.flesh, inside.lip)
+        )
+        found = creases(lightness, flesh > 0.5, lip > 0.5, step_px)
+        crease, beyond = (values[:, reach - count : reach + count + 1] for values in found)
+        return crease, beyond
+
+    def ridge(self, curve: np.ndarray, strength: np.ndarray, region: MouthRegion) -> np.ndarray:
+        dense = np.concatenate([curve + t * (np.roll(curve, -1, 0) - curve) for t in (0.0, 0.5)])
+        strength = np.concatenate([strength, strength])
+        rows, columns = np.nonzero(region.mask)
+        distance, nearest = cKDTree(dense).query(np.stack([columns, rows], axis=1) + 0.5)
+        width = self.width * self.interocular_size_px
+        values = np.zeros(region.mask.shape, dtype=np.float32)
+        values[rows, columns] = (0.4 + 0.6 * strength[nearest]) * np.exp(
+            -0.5 * (distance / width) ** 2
+        )
+        return values
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz` of plain arrays, whole or not at all."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        save_arrays(path, {"format_version": FORMAT_VERSION, "kind": self.kind, **arrays})
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
+        """Of what `save` wrote. Raises KeyError where something is missing."""
+        values = {field.name: arrays[field.name] for field in fields(cls)}
+        return cls(**{k: float(v) if np.ndim(v) == 0 else v for k, v in values.items()})
+
+
+def blurred_colours(picture: np.ndarray) -> np.ndarray:
+    """Colour channels (3, h, w) of a picture (h, w, 3), a little blurred."""
+    colours = image_channels(picture)[:3]
+    return np.stack([cv2.GaussianBlur(plane, (0, 0), BLUR_PX) for plane in colours])

@@ -1,0 +1,225 @@
+"""Likelihood maps where nobody labelled contours: from the tracked lips and all of a take's pictures.
+
+A tracked mouth is the right one up to an error that all frames share: where the model's lips end is
+not where the person's do. So what lies beside each place of the outer contour is learnt from frames
+of the whole take, laid over each other along the tracked lips: the colours on either side, and how
+far from the track they meet. A frame moves that border a little. The inner contour lies where what is
+seen is not lip any more, looked for from where it lies on average.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from vermilion.contours.curves import filled, loop_spline, outward_normals, sampled
+from vermilion.contours.lip_planes import dark_lines, lip_planes
+from vermilion.contours.paths import cheapest_ring
+from vermilion.contours.region import MouthRegion
+from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
+
+STEP_PX = 0.5
+#: Beside a border, what counts as lip and as skin (per inter-ocular distance).
+BESIDE = (0.01, 0.04)
+#: Deviation along the contour of what is learnt together (share of the ring).
+ALONG = 3 / 80
+LEAST_SPREAD = 0.02  # of a colour about its mean
+ROUNDS, INNER_ROUNDS = 6, 2
+SMOOTH = 6  # binomial passes over the tracked rings, whose edges are the mesh's
+
+
+@dataclass(frozen=True)
+class TrackRidgeDetector(RidgeDetector):
+    """Ridges about the lips' borders near the tracked lips. `reach` is of the inner border.
+
+    Attributes:
+        frame_reach: how far a frame's outer border may lie from the take's, per inter-ocular distance.
+        outer_offset: (n,) the take's outer border from the tracked one, outwards, per inter-ocular
+            distance.
+        direction, middle: (n, 3) and (n,): a colour c at sample k is lip where
+            direction[k] . c > middle[k].
+        inner_offset: (m,) as `outer_offset`, of the inner border.
+    """
+
+    kind = "track"
+    from_track = True
+
+    reach: float = 0.05
+    frame_reach: float = 0.02
+    outer_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    direction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    middle: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+        """Name of the contour -> (size, size) likelihood of a cropped region."""
+        colours = blurred_colours(picture)
+        outer, strength = self.outer_border(colours, region)
+        outer = loop_spline(outer)
+        strength = np.interp(
+            np.arange(len(outer)) / len(outer),
+            np.arange(len(strength) + 1) / len(strength),
+            np.append(strength, strength[0]),
+        )
+        inner, inner_strength = self.inner_border(colours, region, outer)
+        return {
+            "inner": self.ridge(inner, inner_strength, region),
+            "outer": self.ridge(outer, strength, region),
+        }
+
+    def outer_border(
+        self, colours: np.ndarray, region: MouthRegion
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Outer border (n, 2) of a frame and how clear it is (n,), near the take's."""
+        ring, size = smooth_ring(region.outer_px), self.interocular_size_px
+        count = int(1.5 * self.frame_reach * size / STEP_PX)
+        places = STEP_PX * np.arange(-count, count + 1)
+        start, normals = self.outer_offset * size, outward_normals(ring)
+        seen = unwrapped(colours, ring, start[:, None] + places)
+        fall = scaled(falls(seen[None], self.direction, self.middle)[0])
+        cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
+        chosen = cheapest_ring(cost, stiff(ring, self.stiffness))
+        offset = binomial(start + places[chosen], 2)
+        return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
+
+    def inner_border(
+        self, colours: np.ndarray, region: MouthRegion, outer: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Inner border (m, 2) of a frame whose outer one (m, 2) is known, and how clear it is (m,)."""
+        reach = self.reach * self.interocular_size_px
+        curve = loop_spline(smooth_ring(region.inner_px), len(self.inner_offset))
+        curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
+            curve
+        )
+        lip, contact = filled(outer, region.size_px).astype(np.float32), dark_lines(colours[0])
+        start, strength = curve, np.zeros(len(curve))
+        for once in PASSES:
+            curves = {"outer": outer, "inner": curve}
+            planes = lip_planes(colours, curves, once.band, once.tolerance)
+            curve, strength = self.moved(
+                curve if once.inner_reach < 1 else start,
+                planes["inner"],
+                once.inner_reach * reach,
+                once.step_px,
+                Inside(colours[0], contact, planes["flesh"], lip),
+            )
+        return curve, strength
+
+
+def learn_borders(
+    detector: TrackRidgeDetector,
+    pictures: Sequence[np.ndarray],
+    regions: Sequence[MouthRegion],
+    reach: float,
+) -> TrackRidgeDetector:
+    """The detector of a take, its borders learnt from some of its frames.
+
+    Args:
+        detector: with the settings, no borders yet.
+        pictures: cropped regions (size, size, 3) linear RGB; regions: theirs, with tracked lips.
+        reach: how far the outer border may lie from the tracked one, per inter-ocular distance.
+    """
+    size = detector.interocular_size_px
+    colours = [blurred_colours(picture) for picture in pictures]
+    rings = [smooth_ring(region.outer_px) for region in regions]
+    count = int(reach * size / STEP_PX)
+    places = STEP_PX * np.arange(-count, count + 1)
+    seen = np.stack([unwrapped(*pair, places) for pair in zip(colours, rings, strict=True)])
+    offset = np.zeros(len(rings[0]))
+    beside = (BESIDE[0] * size, BESIDE[1] * size)
+    direction, middle = _discriminants(seen, places, offset, beside)
+    for _ in range(ROUNDS):
+        fall = scaled(falls(seen, direction, middle).mean(axis=0))
+        cost = (places / (reach * size)) ** 2 - detector.edge_weight * fall
+        offset = binomial(places[cheapest_ring(cost, stiff(rings[0], detector.stiffness))], 2)
+        direction, middle = _discriminants(seen, places, offset, beside)
+    detector = replace(
+        detector,
+        outer_offset=offset / size, direction=direction, middle=middle, inner_offset=np.zeros(240),
+    )  # fmt: skip
+    for _ in range(INNER_ROUNDS):
+        found = []
+        for planes, region in zip(colours, regions, strict=True):
+            outer = loop_spline(detector.outer_border(planes, region)[0])
+            tracked = loop_spline(smooth_ring(region.inner_px), len(outer))
+            moved = detector.inner_border(planes, region, outer)[0] - tracked
+            found.append((moved * outward_normals(tracked)).sum(axis=1))
+        detector = replace(detector, inner_offset=binomial(np.median(found, axis=0), 20) / size)
+    return detector
+
+
+def unwrapped(colours: np.ndarray, ring: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Colours (n, T, 3) at distances `places` (T,) or (n, T) outwards from a ring (n, 2)."""
+    places = np.broadcast_to(places, (len(ring), np.shape(places)[-1]))
+    points = ring[:, None] + places[..., None] * outward_normals(ring)[:, None]
+    return np.stack([sampled(plane, points) for plane in colours], axis=-1)
+
+
+def falls(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """How steeply the probability of lip falls outwards, (F, n, T) a pixel, of colours (F, n, T, 3)."""
+    log_odds = np.einsum("fntc,nc->fnt", seen, direction) - middle[None, :, None]
+    lip = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))
+    return np.maximum(-np.gradient(lip, STEP_PX, axis=2), 0.0)
+
+
+def scaled(fall: np.ndarray) -> np.ndarray:
+    """Falls (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
+    return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
+
+
+def stiff(ring: np.ndarray, stiffness: float) -> np.ndarray:
+    """(n,) cost of one squared step between sample k of a ring (n, 2) and the next."""
+    apart = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    return stiffness * (STEP_PX / np.maximum(apart, STEP_PX)) ** 2
+
+
+def binomial(values: np.ndarray, passes: int) -> np.ndarray:
+    """Values (n,) of a closed ring after binomial smoothing."""
+    for _ in range(passes):
+        values = 0.25 * np.roll(values, 1) + 0.5 * values + 0.25 * np.roll(values, -1)
+    return values
+
+
+def smooth_ring(ring: np.ndarray) -> np.ndarray:
+    """A ring (n, 2) without the mesh's edges; its corners, samples 0 and n / 2, stay."""
+    half = len(ring) // 2
+    parts = []
+    for part in (ring[: half + 1], np.concatenate([ring[half:], ring[:1]])):
+        for _ in range(SMOOTH):
+            middle = 0.25 * part[:-2] + 0.5 * part[1:-1] + 0.25 * part[2:]
+            part = np.concatenate([part[:1], middle, part[-1:]])
+        parts.append(part[:-1])
+    return np.concatenate(parts)
+
+
+def _discriminants(
+    seen: np.ndarray, places: np.ndarray, offset: np.ndarray, beside: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Linear discriminant of lip and skin at each sample: directions (n, 3) and middles (n,).
+
+    Args:
+        seen: (F, n, T, 3) colours at `places` (T,) from the ring.
+        offset: (n,) of the border from the ring.
+        beside: from where to where colours count, to either side of the border; as `places`.
+    """
+    away = places - offset[:, None]
+    means, covariances = [], []
+    for side in (-away, away):
+        counts = ((side > beside[0]) & (side < beside[1])).astype(float)
+        total = _along(len(seen) * counts.sum(axis=1))
+        mean = _along(np.einsum("fntc,nt->nc", seen, counts)) / total[:, None]
+        square = _along(np.einsum("fntc,fntd,nt->ncd", seen, seen, counts))
+        means.append(mean)
+        covariances.append(square / total[:, None, None] - mean[:, :, None] * mean[:, None])
+    shared = 0.5 * (covariances[0] + covariances[1]) + LEAST_SPREAD**2 * np.eye(3)
+    lip, skin = means
+    direction = np.linalg.solve(shared, (lip - skin)[..., None])[..., 0]
+    return direction, (0.5 * (lip + skin) * direction).sum(axis=1)
+
+
+def _along(values: np.ndarray) -> np.ndarray:
+    """Sums (n, ...) with those of the neighbours on the ring."""
+    return gaussian_filter1d(values, ALONG * len(values), axis=0, mode="wrap")

@@ -1,0 +1,124 @@
+"""Contours near tracked lips: borders that a take tells, where the track and single frames err."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.unit.mouths import draw_mouth, ellipse
+from vermilion.contours.curves import loop_spline
+from vermilion.contours.detector import load_detector
+from vermilion.contours.ridges import blurred_colours
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders, smooth_ring
+from vermilion.evaluation.contour_error import distance_to_polyline
+
+CENTRE, WIDTH = (120.0, 150.0), 52.0
+SHAPES = [(4.0, 22.0), (12.0, 28.0), (7.0, 24.0), (9.0, 26.0), (14.0, 30.0), (10.0, 25.0)]
+
+
+def rings(opening, height, outer_px=0.0, inner_px=0.0):
+    """Tracked lips of a drawn mouth, so far outside of the true ones, 80 samples each."""
+    return (
+        ellipse(CENTRE, WIDTH + outer_px, height + outer_px, 80),
+        ellipse(CENTRE, 0.75 * WIDTH + inner_px, opening + inner_px, 80),
+    )
+
+
+def learnt(detector=None, outer_px=6.0, inner_px=3.0, reach=0.08):
+    detector = detector or TrackRidgeDetector()
+    pictures, regions = [], []
+    for seed, (opening, height) in enumerate(SHAPES):
+        picture, landmarks, _ = draw_mouth(opening, height, seed=seed)
+        regions.append(detector.region(landmarks, rings(opening, height, outer_px, inner_px)))
+        pictures.append(regions[-1].crop(picture))
+    return learn_borders(detector, pictures, regions, reach)
+
+
+def borders_px(detector, picture, landmarks, lips):
+    """Outer and inner border in the picture."""
+    region = detector.region(landmarks, lips)
+    colours = blurred_colours(region.crop(picture))
+    outer = loop_spline(detector.outer_border(colours, region)[0])
+    return tuple(
+        region.to_image(curve)
+        for curve in (outer, detector.inner_border(colours, region, outer)[0])
+    )
+
+
+@pytest.fixture(scope="module")
+def detector():
+    return learnt()
+
+
+@pytest.mark.parametrize("outer_px", [-6.0, 6.0])
+def test_what_all_frames_share_is_learnt(outer_px):
+    found = learnt(outer_px=outer_px).outer_offset * 200
+    along = np.r_[8:33, 48:73]  # the corners have little lip beside them
+    assert found[along] == pytest.approx(np.full(len(along), -outer_px), abs=1.0)
+
+
+def test_borders_of_a_frame_that_was_not_learnt_from(detector):
+    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    outer, inner = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 6.0, 3.0))
+    assert distance_to_polyline(outer, label.outer.points_px, True).mean() < 0.7
+    assert distance_to_polyline(inner, label.inner.points_px, True).mean() < 1.2
+
+
+def test_a_frame_may_leave_the_takes_border_by_its_reach(detector):
+    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    outer, _ = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 9.0, 3.0))
+    assert distance_to_polyline(outer, label.outer.points_px, True).mean() < 1.2
+    far, _ = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 30.0, 3.0))
+    assert distance_to_polyline(far, label.outer.points_px, True).mean() > 15.0
+
+
+def test_a_shadow_that_one_light_casts_on_the_skin_is_not_lip(detector):
+    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    rows = np.arange(240)
+    shade = np.where((rows > 183) & (rows < 189), 0.5, 1.0)[:, None, None]  # under the lower lip
+    lips = rings(8.0, 27.0, 6.0, 3.0)
+    outer, _ = borders_px(detector, picture * shade, landmarks, lips)
+    assert distance_to_polyline(outer, label.outer.points_px, True).max() < 3.5
+
+
+def test_maps_are_ridges_about_the_true_contours(detector):
+    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    maps = detector.likelihood(picture, landmarks, rings(8.0, 27.0, 6.0, 3.0))
+    for plane, line in zip(maps, (label.inner, label.outer), strict=True):
+        rows, columns = np.nonzero(plane > 0.5 * plane.max())
+        points = np.stack([columns, rows], axis=1) + 0.5
+        assert distance_to_polyline(points, line.points_px, True).mean() < 2.0
+        assert 0.4 < plane.max() <= 1
+
+
+def test_nothing_to_see_leaves_the_track_where_it_is():
+    detector, (_, landmarks, _) = TrackRidgeDetector(), draw_mouth()
+    flat = np.full((240, 240, 3), 0.2, dtype=np.float32)
+    region = detector.region(landmarks, rings(10.0, 26.0))
+    found = learn_borders(detector, [region.crop(flat)], [region], 0.08)
+    assert np.abs(found.outer_offset).max() < 0.01
+    maps = found.likelihood(flat, landmarks, rings(10.0, 26.0))
+    assert all(np.isfinite(plane).all() for plane in maps)
+
+
+def test_smoothing_takes_the_meshs_edges_and_leaves_the_corners():
+    true = ellipse(CENTRE, WIDTH, 26.0, 80)
+    jagged = true + 0.5 * (-1.0) ** np.arange(80)[:, None]
+    smooth = smooth_ring(jagged)
+    np.testing.assert_array_equal(smooth[[0, 40]], jagged[[0, 40]])
+    between = smooth[np.r_[8:33, 48:73]]  # a smoothed bend is a flatter one
+    assert distance_to_polyline(between, true, True).max() < 0.35
+
+
+def test_the_file_says_all(detector, tmp_path):
+    detector.save(tmp_path / "detector.npz")
+    again = load_detector(tmp_path / "detector.npz")
+    assert isinstance(again, TrackRidgeDetector)
+    picture, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
+    lips = rings(8.0, 27.0, 6.0, 3.0)
+    for one, other in zip(
+        detector.likelihood(picture, landmarks, lips),
+        again.likelihood(picture, landmarks, lips),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one, other)
