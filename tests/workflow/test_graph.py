@@ -1,5 +1,6 @@
 """The graph of jobs: truth stays in the evaluation, and parameters hold what a rule reads."""
 
+import json
 import re
 
 import pytest
@@ -46,6 +47,17 @@ def test_only_the_evaluation_reads_external_truth(fresh_project, data_root):
     run = Project(fresh_project.folder, "config/sample.yaml").snakemake("--dry-run")
     jobs = jobs_of(run.stdout + run.stderr)
     assert {rule for rule, inputs, _ in jobs if "capture-sample-truth" in inputs} == MEASURING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("detector", "follow"), [({}, False), ({"kind": "track"}, True)])
+def test_contours_wait_for_the_track_where_nobody_labelled(fresh_project, detector, follow):
+    contours = json.dumps({"detector": detector})
+    run = fresh_project.snakemake("--dry-run", "--config", f"contours={contours}")
+    jobs = jobs_of(run.stdout + run.stderr)
+    for rule in ("contour_detector", "contours"):
+        inputs = [inputs for name, inputs, _ in jobs if name == rule]
+        assert inputs and all(("/tracking/C/" in found) == follow for found in inputs)
 
 
 def test_a_change_of_the_evaluation_reruns_nothing_that_comes_before_it():
