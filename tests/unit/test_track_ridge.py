@@ -50,7 +50,7 @@ def detector():
     return learnt()
 
 
-@pytest.mark.parametrize("outer_px", [-6.0, 6.0])
+@pytest.mark.parametrize("outer_px", [-6.0, 6.0, 14.0])
 def test_what_all_frames_share_is_learnt(outer_px):
     found = learnt(outer_px=outer_px).outer_offset * 200
     along = np.r_[8:33, 48:73]  # the corners have little lip beside them
@@ -89,6 +89,14 @@ def test_maps_are_ridges_about_the_true_contours(detector):
         points = np.stack([columns, rows], axis=1) + 0.5
         assert distance_to_polyline(points, line.points_px, True).mean() < 2.0
         assert 0.4 < plane.max() <= 1
+
+
+def test_the_least_reaches_and_the_least_region_serve():
+    detector = TrackRidgeDetector(interocular_size_px=60.0, reach=0.001, frame_reach=0.001)
+    found = learnt(detector, outer_px=0.0, inner_px=0.0, reach=0.001)
+    picture, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
+    maps = found.likelihood(picture, landmarks, rings(8.0, 27.0))
+    assert all(np.isfinite(plane).all() and plane.max() > 0.3 for plane in maps)
 
 
 def test_nothing_to_see_leaves_the_track_where_it_is():

@@ -109,7 +109,7 @@ class RidgeDetector(ContourDetector):
 
         The inner one (with `inside`) also where lips touch or gums begin.
         """
-        normals, count = outward_normals(curve), int(reach_px / step_px)
+        normals, count = outward_normals(curve), max(int(reach_px / step_px), 1)
         places = step_px * np.arange(-count, count + 1)
         points = curve[:, None] + places[None, :, None] * normals[:, None]
         fall = np.maximum(-np.gradient(sampled(plane, points), step_px, axis=1), 0.0)

@@ -75,7 +75,7 @@ class TrackRidgeDetector(RidgeDetector):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Outer border (n, 2) of a frame and how clear it is (n,), near the take's."""
         ring, size = smooth_ring(region.outer_px), self.interocular_size_px
-        count = int(1.5 * self.frame_reach * size / STEP_PX)
+        count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
         start, normals = self.outer_offset * size, outward_normals(ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
@@ -125,16 +125,19 @@ def learn_borders(
     size = detector.interocular_size_px
     colours = [blurred_colours(picture) for picture in pictures]
     rings = [smooth_ring(region.outer_px) for region in regions]
-    count = int(reach * size / STEP_PX)
-    places = STEP_PX * np.arange(-count, count + 1)
+    beside = (BESIDE[0] * size, BESIDE[1] * size)
+    # A border at the end of the reach has something on either side of it all the same.
+    count, more = max(int(reach * size / STEP_PX), 1), int(beside[1] / STEP_PX) + 1
+    places = STEP_PX * np.arange(-count - more, count + more + 1)
+    within = slice(more, -more)
     seen = np.stack([unwrapped(*pair, places) for pair in zip(colours, rings, strict=True)])
     offset = np.zeros(len(rings[0]))
-    beside = (BESIDE[0] * size, BESIDE[1] * size)
     direction, middle = _discriminants(seen, places, offset, beside)
     for _ in range(ROUNDS):
-        fall = scaled(falls(seen, direction, middle).mean(axis=0))
-        cost = (places / (reach * size)) ** 2 - detector.edge_weight * fall
-        offset = binomial(places[cheapest_ring(cost, stiff(rings[0], detector.stiffness))], 2)
+        fall = scaled(falls(seen, direction, middle).mean(axis=0)[:, within])
+        cost = (places[within] / (reach * size)) ** 2 - detector.edge_weight * fall
+        chosen = cheapest_ring(cost, stiff(rings[0], detector.stiffness))
+        offset = binomial(places[within][chosen], 2)
         direction, middle = _discriminants(seen, places, offset, beside)
     detector = replace(
         detector,
