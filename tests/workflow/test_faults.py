@@ -63,21 +63,24 @@ def whole(finished):
     assert finished.would_run() == {}
 
 
+# Jobs near the end are killed: all that comes after them is made again, and looked at.
+
+
 def test_killed_job(finished, whole):
-    chunk = sorted(finished.results.glob("takes/s1/rom/tracking/C/*.npy"))[0]
+    chunk = sorted(finished.results.glob("apply/s1/phone/chunks/*.npy"))[0]
     chunk.unlink()
     run = start(finished)
-    wait_for_job(run, "tracking_meshes").send_signal(signal.SIGKILL)
+    wait_for_job(run, "apply").send_signal(signal.SIGKILL)
     assert run.wait(timeout=300) != 0
     assert not chunk.exists() and not list(chunk.parent.glob(".*"))
     finished.snakemake()
 
 
 def test_killed_run(finished, whole):
-    chunk = sorted(finished.results.glob("takes/s1/rom/tracking/C/*.npy"))[0]
+    chunk = sorted(finished.results.glob("takes/s1/rom/tracking/residuals/photometric/*.tsv"))[0]
     chunk.unlink()
     run = start(finished)
-    wait_for_job(run, "tracking_meshes")
+    wait_for_job(run, "residuals")
     os.killpg(run.pid, signal.SIGKILL)
     run.wait(timeout=60)
     finished.snakemake("--unlock")
