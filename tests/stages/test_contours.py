@@ -60,6 +60,8 @@ def take(tmp_path_factory):
         root / "landmarks.npz"
     )
     _write_track(root, n)
+    coarse = np.tile(mouth_model(8.0, 24.0).neutral_mm, (n, 1, 1))
+    write_sequence(root / "000000-000004.npy", coarse)
     params = {
         "cfg": CFG,
         "source": str(capture),
@@ -197,7 +199,7 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
         "landmarks": [root / "landmarks.npz"],
         "tracker": root / "tracker.npz",
         "fit": root / "fit.npz",
-        "coarse": [root / "000000-000004/C.npy"],
+        "coarse": [root / "000000-000004.npy"],
     }
     job = {"wildcards": NAME, "output": {"detector": tmp_path / "detector.npz"}}
     bare = {**params, "capture": str(tmp_path)}
@@ -243,7 +245,7 @@ def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_p
             "landmarks": [root / "landmarks.npz"],
             "tracker": root / "tracker.npz",
             "fit": root / "fit.npz",
-            "coarse": [root / "000000-000004/C.npy"],
+            "coarse": [root / "000000-000004.npy"],
         },
         output={"detector": tmp_path / "detector.npz"},
     )

@@ -15,7 +15,7 @@ from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
 from vermilion.progress import progress
-from vermilion.sequences import read_sequence
+from vermilion.sequences import locate, read_sequence
 from vermilion.tracking.result import TrackedTake
 
 
@@ -24,14 +24,10 @@ def from_track(snakemake, cfg, source, track):
     options, inputs = cfg.track, snakemake.input
     fit = TrackedTake.load(inputs.fit)
     lips = TrackedLips.of(FaceModel.load(inputs.tracker))
-    # Along the take's frames, so that they are not all of its first chunk.
-    coarse = np.concatenate([read_sequence(path) for path in inputs.coarse])
-    tracked = dict(zip(fit.frames.tolist(), fit.valid, strict=True))
-    valid = [
-        f
-        for f, good in zip(track.frames.tolist(), track.valid, strict=True)
-        if good and tracked.get(f)
-    ]
+    seen = track.frames[track.valid & np.isin(track.frames, fit.frames[fit.valid])]
+    frames = sorted(evenly(seen.tolist(), options.frames))
+    meshes = locate(inputs.coarse, frames)
+    landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector(
         cfg.interocular_size_px,
         cfg.margin,
@@ -42,16 +38,16 @@ def from_track(snakemake, cfg, source, track):
         options.frame_reach,
     )
     pictures, regions = [], []
-    for frame in progress(sorted(evenly(valid, options.frames)), "frames that tell the lips"):
-        points = track.points_px[track.frames.tolist().index(frame)]
+    for frame in progress(frames, "frames that tell the lips"):
         try:
             picture = source.read(snakemake.params.camera, frame)
         except InputError:
             continue  # the frame is flagged where its maps are drawn
-        if usable(points, picture.shape):
+        if usable(landmarks[frame], picture.shape):
             continue
-        rings = lips.rings_px(coarse[int(fit.index_of([frame])[0])], fit.camera)
-        regions.append(detector.region(points, rings))
+        path, row = meshes[frame]
+        rings = lips.rings_px(read_sequence(path)[row], fit.camera)
+        regions.append(detector.region(landmarks[frame], rings))
         pictures.append(regions[-1].crop(picture))
     if not pictures:
         return None
