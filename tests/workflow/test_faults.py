@@ -45,9 +45,12 @@ def wait_for_job(run, script, seconds=120):
     end = time.monotonic() + seconds
     while time.monotonic() < end and run.poll() is None:
         for child in psutil.Process(run.pid).children(recursive=True):
-            with_name = [part for part in child.cmdline() if part.endswith(f".{script}.py")]
-            if with_name and "python" in child.name():
-                return child
+            try:
+                with_name = [part for part in child.cmdline() if part.endswith(f".{script}.py")]
+                if with_name and "python" in child.name():
+                    return child
+            except psutil.NoSuchProcess:
+                continue  # it ended, or is about to, while it was looked at
         time.sleep(0.02)
     raise AssertionError(f"no job of {script} started")
 
@@ -77,10 +80,10 @@ def test_killed_job(finished, whole):
 
 
 def test_killed_run(finished, whole):
-    chunk = sorted(finished.results.glob("takes/s1/rom/tracking/residuals/photometric/*.tsv"))[0]
+    chunk = sorted(finished.results.glob("apply/s1/phone/chunks/*.npy"))[0]
     chunk.unlink()
     run = start(finished)
-    wait_for_job(run, "residuals")
+    wait_for_job(run, "apply")
     os.killpg(run.pid, signal.SIGKILL)
     run.wait(timeout=60)
     finished.snakemake("--unlock")
