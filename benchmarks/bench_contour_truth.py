@@ -33,7 +33,7 @@ from vermilion.contours.curves import loop_spline
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
-from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
 from vermilion.evaluation.contour_error import distance_to_polyline
 from vermilion.faces.model import FaceModel
@@ -117,17 +117,6 @@ def read_track(results: Path, take: str) -> tuple[FaceModel, TrackedTake, np.nda
     return model, TrackedTake.load(folder / "fit.npz"), np.concatenate(meshes)
 
 
-def learnt(source, track: LandmarkTrack, rings, camera) -> TrackRidgeDetector:
-    """The detector that the take itself tells; `rings` (frame) -> tracked lips."""
-    section, detector = TrackRidgeConfig(), TrackRidgeDetector()
-    frames = sorted(evenly(np.flatnonzero(track.valid).tolist(), section.frames))
-    regions = [detector.region(track.points_px[f], rings(f)) for f in frames]
-    pictures = [
-        region.crop(source.read(camera.name, f)) for f, region in zip(frames, regions, strict=True)
-    ]
-    return learn_borders(detector, pictures, regions, section.reach)
-
-
 def finder(tracked, track: LandmarkTrack, camera):
     """A function (frame, maps) -> contours."""
     settings = SearchSettings()
@@ -173,7 +162,15 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     if tracked:
         lips = TrackedLips.of(tracked[0])
         rings = {f: lips.rings_px(mesh, camera) for f, mesh in enumerate(tracked[2])}
-        detectors["track"] = learnt(source, track, rings.__getitem__, camera)
+        section = TrackRidgeConfig()
+        detectors["track"] = learn_from_take(
+            TrackRidgeDetector(),
+            sorted(evenly(np.flatnonzero(track.valid).tolist(), section.frames)),
+            lambda frame: source.read(camera.name, frame),
+            track.points_px.__getitem__,
+            rings.__getitem__,
+            section.reach,
+        )
     rows = []
     for frame in range(0, len(true_mm), every):
         if frame in labels:

@@ -228,6 +228,24 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
         run_script("contour_detector", params=demanding, input=track, **job)
 
 
+def test_labels_of_which_none_serves_leave_the_landmarks(take, tmp_path):
+    from vermilion.contours.detector import load_detector
+    from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+
+    root, params = take
+    lost = LandmarkTrack.load(root / "landmarks.npz")
+    valid = ~np.isin(lost.frames, LABELLED)
+    LandmarkTrack(lost.frames, lost.points_px, lost.confidence, valid).save(tmp_path / "lost.npz")
+    run_script(
+        "contour_detector",
+        wildcards=NAME,
+        params=params,
+        input={"landmarks": [tmp_path / "lost.npz"]},
+        output={"detector": tmp_path / "detector.npz"},
+    )
+    assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)
+
+
 def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_path):
     from vermilion.contours.detector import load_detector
     from vermilion.contours.landmark_ridge import LandmarkRidgeDetector

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.unit.mouths import draw_mouth, ellipse
-from vermilion.contours.curves import loop_spline
+from vermilion.contours.curves import loop_spline, smoothed_halves
 from vermilion.contours.detector import load_detector
 from vermilion.contours.ridges import blurred_colours
-from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders, smooth_ring
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
 from vermilion.evaluation.contour_error import distance_to_polyline
 
 CENTRE, WIDTH = (120.0, 150.0), 52.0
@@ -112,7 +112,7 @@ def test_nothing_to_see_leaves_the_track_where_it_is():
 def test_smoothing_takes_the_meshs_edges_and_leaves_the_corners():
     true = ellipse(CENTRE, WIDTH, 26.0, 80)
     jagged = true + 0.5 * (-1.0) ** np.arange(80)[:, None]
-    smooth = smooth_ring(jagged)
+    smooth = smoothed_halves(jagged, 6)
     np.testing.assert_array_equal(smooth[[0, 40]], jagged[[0, 40]])
     between = smooth[np.r_[8:33, 48:73]]  # a smoothed bend is a flatter one
     assert distance_to_polyline(between, true, True).max() < 0.35

@@ -5,16 +5,13 @@ import numpy as np
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
-from vermilion.contours.region import usable
-from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.contours.training import TrainingSettings, read_labelled, train_detector
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
-from vermilion.progress import progress
 from vermilion.sequences import locate, read_sequence
 from vermilion.tracking.result import TrackedTake
 
@@ -37,21 +34,19 @@ def from_track(snakemake, cfg, source, track):
         cfg.stiffness,
         options.frame_reach,
     )
-    pictures, regions = [], []
-    for frame in progress(frames, "frames that tell the lips"):
-        try:
-            picture = source.read(snakemake.params.camera, frame)
-        except InputError:
-            continue  # the frame is flagged where its maps are drawn
-        if usable(landmarks[frame], picture.shape):
-            continue
+
+    def lips_px(frame: int) -> tuple[np.ndarray, np.ndarray]:
         path, row = meshes[frame]
-        rings = lips.rings_px(read_sequence(path)[row], fit.camera)
-        regions.append(detector.region(landmarks[frame], rings))
-        pictures.append(regions[-1].crop(picture))
-    if not pictures:
-        return None
-    return learn_borders(detector, pictures, regions, options.reach)
+        return lips.rings_px(read_sequence(path)[row], fit.camera)
+
+    return learn_from_take(
+        detector,
+        frames,
+        lambda frame: source.read(snakemake.params.camera, frame),
+        landmarks.__getitem__,
+        lips_px,
+        options.reach,
+    )
 
 
 def main(snakemake) -> None:
@@ -71,7 +66,9 @@ def main(snakemake) -> None:
         )
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
-    elif cfg.kind != "landmarks":
+    elif snakemake.input.get(
+        "fit"
+    ):  # labels of which none serves leave a take without a track here
         detector = from_track(snakemake, cfg, source, track)
     if detector is None:
         detector = LandmarkRidgeDetector(

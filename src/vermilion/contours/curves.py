@@ -7,8 +7,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+#: Points of a curve through a loop.
+CURVE_POINTS = 240
 
-def loop_spline(loop_px: np.ndarray, n_points: int = 240) -> np.ndarray:
+
+def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray:
     """Closed curve through a loop of landmarks (n, 2), (n_points, 2); sharp at the mouth corners.
 
     The first point and the one farthest from it (the other corner, as the 66-point scheme has
@@ -22,6 +25,25 @@ def loop_spline(loop_px: np.ndarray, n_points: int = 240) -> np.ndarray:
         places = np.linspace(0, along[-1], n_points // 2, endpoint=False)
         halves.append(CubicSpline(along, part)(places))
     return np.concatenate(halves)
+
+
+def smoothed_ring(values: np.ndarray, passes: int) -> np.ndarray:
+    """(n, ...) values of a closed ring after binomial smoothing."""
+    for _ in range(passes):
+        values = 0.25 * np.roll(values, 1, axis=0) + 0.5 * values + 0.25 * np.roll(values, -1, 0)
+    return values
+
+
+def smoothed_halves(ring: np.ndarray, passes: int) -> np.ndarray:
+    """The same of a ring (n, 2) whose corners, samples 0 and n / 2, stay."""
+    half = len(ring) // 2
+    parts = []
+    for part in (ring[: half + 1], np.concatenate([ring[half:], ring[:1]])):
+        for _ in range(passes):
+            middle = 0.25 * part[:-2] + 0.5 * part[1:-1] + 0.25 * part[2:]
+            part = np.concatenate([part[:1], middle, part[-1:]])
+        parts.append(part[:-1])
+    return np.concatenate(parts)
 
 
 def gap(curve: np.ndarray) -> np.ndarray:

@@ -29,10 +29,12 @@ class ContourDetector(ABC):
         margin: of the region round the mouth, per inter-ocular distance.
     """
 
-    interocular_size_px: float
-    margin: float
+    #: What the file calls it.
+    kind: ClassVar[str]
     #: Whether it starts from the lips of the track, and not from the landmarks'.
     from_track: ClassVar[bool] = False
+    interocular_size_px: float
+    margin: float
 
     def region(
         self, landmarks_px: np.ndarray, lips_px: tuple[np.ndarray, np.ndarray] | None = None
@@ -75,6 +77,8 @@ class BoostedDetector(ContourDetector):
         smoothing_px: deviation of the Gaussian on the maps, region pixels.
     """
 
+    kind = "boosted"
+
     forests: dict[str, Forest]
     interocular_size_px: float
     margin: float
@@ -96,7 +100,7 @@ class BoostedDetector(ContourDetector):
         """Write `.npz` of plain arrays, whole or not at all."""
         arrays = {
             "format_version": FORMAT_VERSION,
-            "kind": "boosted",
+            "kind": self.kind,
             "channels": np.array(CHANNELS),
             "interocular_size_px": self.interocular_size_px,
             "margin": self.margin,
@@ -147,11 +151,8 @@ def load_detector(path: str | Path) -> ContourDetector:
     from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
     from vermilion.contours.track_ridge import TrackRidgeDetector
 
-    kinds = {
-        "boosted": BoostedDetector.from_arrays,
-        "track": TrackRidgeDetector.from_arrays,
-        "landmarks": LandmarkRidgeDetector.from_arrays,
-    }
+    detectors = (BoostedDetector, TrackRidgeDetector, LandmarkRidgeDetector)
+    kinds = {detector.kind: detector.from_arrays for detector in detectors}
     expected = f"a contour detector of format {FORMAT_VERSION}"
     hint = "Remove the file and run again: the detector is trained anew."
     arrays = read_arrays(path, "contour detector", error=ModelFileError)
@@ -159,7 +160,7 @@ def load_detector(path: str | Path) -> ContourDetector:
         version, kind = int(arrays["format_version"]), str(arrays["kind"])
         if version != FORMAT_VERSION or kind not in kinds:
             raise ModelFileError(f"format {version}, kind {kind}", expected, hint, path=path)
-        if kind == "boosted" and tuple(arrays["channels"]) != CHANNELS:
+        if kind == BoostedDetector.kind and tuple(arrays["channels"]) != CHANNELS:
             raise ModelFileError("other image channels", expected, hint, path=path)
         return kinds[kind](arrays)
     except KeyError as error:

@@ -43,3 +43,9 @@ def cheapest_ring(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
         tied[row, free[start]] = cost[start, free[start]]
     path = cheapest_path(tied, np.append(np.roll(smoothness, -start), 0.0))
     return np.roll(path[:n], start)
+
+
+def step_cost(ring: np.ndarray, step: float, weight: float) -> np.ndarray:
+    """`smoothness` (n,) of a ring (n, 2 or 3) whose columns lie `step` apart: a slope of 1 costs `weight`."""
+    apart = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    return weight * (step / np.maximum(apart, step)) ** 2

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Self
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.channels import image_channels
-from vermilion.contours.curves import gap, outward_normals, sampled
+from vermilion.contours.curves import gap, outward_normals, sampled, smoothed_ring
 from vermilion.contours.detector import FORMAT_VERSION, ContourDetector, save_arrays
 from vermilion.contours.gums import creases
-from vermilion.contours.paths import cheapest_ring
+from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion
 
 BLUR_PX = 1.0  # of the colours
@@ -34,8 +34,8 @@ class Pass:
         band: where lips are sure to be, from the outer (0) to the inner (1) border.
         tolerance: squared deviations from the lips' colour at which a colour is 63 % strange.
         outer_reach: of the search for the outer border about the last one found, per the detector's.
-        inner_reach: of the search for the inner border. A whole reach starts at the landmarks, a
-            part at the border found before.
+        inner_reach: of the search for the inner border. A whole reach starts where the detector
+            does, a part at the border found before.
         step_px: between the places along a normal, region pixels.
     """
 
@@ -88,8 +88,6 @@ class RidgeDetector(ContourDetector):
         stiffness: cost of a slope of 1 of the moved ring against the start, squared.
     """
 
-    kind: ClassVar[str]
-
     interocular_size_px: float = 200.0
     margin: float = 0.16
     width: float = 0.008
@@ -122,12 +120,9 @@ class RidgeDetector(ContourDetector):
             crease, beyond = self._creases(curve, normals, inside, step_px, count)
             fall += (1.0 - near) * (crease - beyond * fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
-        apart = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
-        chosen = cheapest_ring(cost, self.stiffness * (step_px / np.maximum(apart, step_px)) ** 2)
+        chosen = cheapest_ring(cost, step_cost(curve, step_px, self.stiffness))
         rows = np.arange(len(curve))
-        moved = curve + places[chosen][:, None] * normals
-        for _ in range(2):
-            moved = 0.25 * np.roll(moved, 1, axis=0) + 0.5 * moved + 0.25 * np.roll(moved, -1, 0)
+        moved = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
         return moved, np.minimum(fall[rows, chosen], 1.0)
 
     def _creases(
@@ -138,7 +133,7 @@ class RidgeDetector(ContourDetector):
         They are looked for from one reach inside it to two outside it, as the landmarks may lie on the
         far border of the gums.
         """
-        reach = int(self.reach * self.interocular_size_px / step_px)
+        reach = max(int(self.reach * self.interocular_size_px / step_px), count)
         places = step_px * np.arange(-reach, 2 * reach + 1)
         points = curve[:, None] + places[None, :, None] * normals[:, None]
         lightness, flesh, lip = (
@@ -149,6 +144,7 @@ class RidgeDetector(ContourDetector):
         return crease, beyond
 
     def ridge(self, curve: np.ndarray, strength: np.ndarray, region: MouthRegion) -> np.ndarray:
+        """Likelihood (size, size) about a curve (n, 2) that is so clear (n,)."""
         dense = np.concatenate([curve + t * (np.roll(curve, -1, 0) - curve) for t in (0.0, 0.5)])
         strength = np.concatenate([strength, strength])
         rows, columns = np.nonzero(region.mask)

@@ -9,17 +9,27 @@ seen is not lip any more, looked for from where it lies on average.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from vermilion.contours.curves import filled, loop_spline, outward_normals, sampled
+from vermilion.contours.curves import (
+    CURVE_POINTS,
+    filled,
+    loop_spline,
+    outward_normals,
+    sampled,
+    smoothed_halves,
+    smoothed_ring,
+)
 from vermilion.contours.lip_planes import dark_lines, lip_planes
-from vermilion.contours.paths import cheapest_ring
-from vermilion.contours.region import MouthRegion
+from vermilion.contours.paths import cheapest_ring, step_cost
+from vermilion.contours.region import MouthRegion, usable
 from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
+from vermilion.errors import InputError
+from vermilion.progress import progress
 
 STEP_PX = 0.5
 #: Beside a border, what counts as lip and as skin (per inter-ocular distance).
@@ -28,7 +38,7 @@ BESIDE = (0.01, 0.04)
 ALONG = 3 / 80
 LEAST_SPREAD = 0.02  # of a colour about its mean
 ROUNDS, INNER_ROUNDS = 6, 2
-SMOOTH = 6  # binomial passes over the tracked rings, whose edges are the mesh's
+EDGE_PASSES = 6  # binomial passes over the tracked rings, whose edges are the mesh's
 
 
 @dataclass(frozen=True)
@@ -74,15 +84,15 @@ class TrackRidgeDetector(RidgeDetector):
         self, colours: np.ndarray, region: MouthRegion
     ) -> tuple[np.ndarray, np.ndarray]:
         """Outer border (n, 2) of a frame and how clear it is (n,), near the take's."""
-        ring, size = smooth_ring(region.outer_px), self.interocular_size_px
+        ring, size = smoothed_halves(region.outer_px, EDGE_PASSES), self.interocular_size_px
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
         start, normals = self.outer_offset * size, outward_normals(ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
         fall = scaled(falls(seen[None], self.direction, self.middle)[0])
         cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
-        chosen = cheapest_ring(cost, stiff(ring, self.stiffness))
-        offset = binomial(start + places[chosen], 2)
+        chosen = cheapest_ring(cost, step_cost(ring, STEP_PX, self.stiffness))
+        offset = smoothed_ring(start + places[chosen], 2)
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
 
     def inner_border(
@@ -90,7 +100,7 @@ class TrackRidgeDetector(RidgeDetector):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Inner border (m, 2) of a frame whose outer one (m, 2) is known, and how clear it is (m,)."""
         reach = self.reach * self.interocular_size_px
-        curve = loop_spline(smooth_ring(region.inner_px), len(self.inner_offset))
+        curve = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(self.inner_offset))
         curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
             curve
         )
@@ -109,6 +119,37 @@ class TrackRidgeDetector(RidgeDetector):
         return curve, strength
 
 
+def learn_from_take(
+    detector: TrackRidgeDetector,
+    frames: Iterable[int],
+    read: Callable[[int], np.ndarray],
+    landmarks_px: Callable[[int], np.ndarray],
+    lips_px: Callable[[int], tuple[np.ndarray, np.ndarray]],
+    reach: float,
+) -> TrackRidgeDetector | None:
+    """The detector of a take, its borders learnt from some of its frames; None where none serves.
+
+    Args:
+        detector: with the settings, no borders yet.
+        frames: numbers of those to learn from; what cannot be read or has no mouth is left out.
+        read: frame -> picture (h, w, 3) linear RGB; landmarks_px: frame -> (66, 2); lips_px: frame ->
+            outer and inner ring (n, 2) of the tracked lips.
+        reach: as of `learn_borders`.
+    """
+    pictures, regions = [], []
+    for frame in progress(list(frames), "frames that tell the lips"):
+        try:
+            picture = read(frame)
+        except InputError:
+            continue  # it is flagged where its maps are drawn
+        points = landmarks_px(frame)
+        if usable(points, picture.shape):
+            continue
+        regions.append(detector.region(points, lips_px(frame)))
+        pictures.append(regions[-1].crop(picture))
+    return learn_borders(detector, pictures, regions, reach) if pictures else None
+
+
 def learn_borders(
     detector: TrackRidgeDetector,
     pictures: Sequence[np.ndarray],
@@ -124,7 +165,7 @@ def learn_borders(
     """
     size = detector.interocular_size_px
     colours = [blurred_colours(picture) for picture in pictures]
-    rings = [smooth_ring(region.outer_px) for region in regions]
+    rings = [smoothed_halves(region.outer_px, EDGE_PASSES) for region in regions]
     beside = (BESIDE[0] * size, BESIDE[1] * size)
     # A border at the end of the reach has something on either side of it all the same.
     count, more = max(int(reach * size / STEP_PX), 1), int(beside[1] / STEP_PX) + 1
@@ -136,21 +177,23 @@ def learn_borders(
     for _ in range(ROUNDS):
         fall = scaled(falls(seen, direction, middle).mean(axis=0)[:, within])
         cost = (places[within] / (reach * size)) ** 2 - detector.edge_weight * fall
-        chosen = cheapest_ring(cost, stiff(rings[0], detector.stiffness))
-        offset = binomial(places[within][chosen], 2)
+        chosen = cheapest_ring(cost, step_cost(rings[0], STEP_PX, detector.stiffness))
+        offset = smoothed_ring(places[within][chosen], 2)
         direction, middle = _discriminants(seen, places, offset, beside)
     detector = replace(
         detector,
-        outer_offset=offset / size, direction=direction, middle=middle, inner_offset=np.zeros(240),
+        outer_offset=offset / size, direction=direction, middle=middle, inner_offset=np.zeros(CURVE_POINTS),
     )  # fmt: skip
     for _ in range(INNER_ROUNDS):
         found = []
         for planes, region in zip(colours, regions, strict=True):
             outer = loop_spline(detector.outer_border(planes, region)[0])
-            tracked = loop_spline(smooth_ring(region.inner_px), len(outer))
+            tracked = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(outer))
             moved = detector.inner_border(planes, region, outer)[0] - tracked
             found.append((moved * outward_normals(tracked)).sum(axis=1))
-        detector = replace(detector, inner_offset=binomial(np.median(found, axis=0), 20) / size)
+        detector = replace(
+            detector, inner_offset=smoothed_ring(np.median(found, axis=0), 20) / size
+        )
     return detector
 
 
@@ -171,31 +214,6 @@ def falls(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.nda
 def scaled(fall: np.ndarray) -> np.ndarray:
     """Falls (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
     return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
-
-
-def stiff(ring: np.ndarray, stiffness: float) -> np.ndarray:
-    """(n,) cost of one squared step between sample k of a ring (n, 2) and the next."""
-    apart = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    return stiffness * (STEP_PX / np.maximum(apart, STEP_PX)) ** 2
-
-
-def binomial(values: np.ndarray, passes: int) -> np.ndarray:
-    """Values (n,) of a closed ring after binomial smoothing."""
-    for _ in range(passes):
-        values = 0.25 * np.roll(values, 1) + 0.5 * values + 0.25 * np.roll(values, -1)
-    return values
-
-
-def smooth_ring(ring: np.ndarray) -> np.ndarray:
-    """A ring (n, 2) without the mesh's edges; its corners, samples 0 and n / 2, stay."""
-    half = len(ring) // 2
-    parts = []
-    for part in (ring[: half + 1], np.concatenate([ring[half:], ring[:1]])):
-        for _ in range(SMOOTH):
-            middle = 0.25 * part[:-2] + 0.5 * part[1:-1] + 0.25 * part[2:]
-            part = np.concatenate([part[:1], middle, part[-1:]])
-        parts.append(part[:-1])
-    return np.concatenate(parts)
 
 
 def _discriminants(

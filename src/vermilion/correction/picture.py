@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vermilion.camera import Camera
+from vermilion.contours.curves import smoothed_ring
 from vermilion.faces.model import FaceModel
-from vermilion.features.search import inward_normals, smoothed_ring
+from vermilion.features.search import inward_normals
 
 #: What a picture takes from feature files.
 PICTURE_ARRAYS = ("outer_px", "inner_px", "outer_found", "inner_found", "valid")

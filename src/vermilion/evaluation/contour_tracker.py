@@ -19,11 +19,12 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from vermilion.camera import Camera
+from vermilion.contours.curves import smoothed_ring
 from vermilion.correction.head import head_from_world, world_from_head
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
-from vermilion.features.search import inward_normals, smoothed_ring
+from vermilion.features.search import inward_normals
 from vermilion.mesh_points import MeshPoints
 
 _ROUNDS = 8

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.contours.paths import cheapest_ring
+from vermilion.contours.curves import smoothed_ring
+from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.features.arch import arch_depth
 
 #: What the fourth power counts beside the square in the cost of an inner contour far from the model's.
@@ -89,13 +90,6 @@ def inward_normals(ring: np.ndarray) -> np.ndarray:
     return normal if area > 0 else -normal
 
 
-def smoothed_ring(values: np.ndarray, passes: int) -> np.ndarray:
-    """(n, ...) values of a closed ring after binomial smoothing."""
-    for _ in range(passes):
-        values = 0.25 * np.roll(values, 1, axis=0) + 0.5 * values + 0.25 * np.roll(values, -1, 0)
-    return values
-
-
 def find_outer(
     likelihood: np.ndarray,
     ring: np.ndarray,
@@ -119,7 +113,7 @@ def find_outer(
     profile = sample(likelihood, to_pixels(lines))
     cost = -np.log(profile + settings.floor)
     cost += settings.model_weight * (places / settings.inward) ** 2
-    chosen = cheapest_ring(cost, _smoothness(ring, unit, settings))
+    chosen = cheapest_ring(cost, step_cost(ring / unit, settings.step, settings.smooth_weight))
     return _refined(profile, places, chosen, lines, settings)
 
 
@@ -164,7 +158,7 @@ def find_inner(
     before = np.pad(before, ((0, 0), (ridge, 0)))[:, : len(places)]
     cost = -np.log(profile + settings.floor) + before
     cost += settings.model_weight * _distance_cost((places - expected[:, None]) / settings.inward)
-    chosen = cheapest_ring(cost, _smoothness(outer, unit, settings))
+    chosen = cheapest_ring(cost, step_cost(outer / unit, settings.step, settings.smooth_weight))
     return _refined(profile, places, chosen, lines, settings)
 
 
@@ -189,12 +183,6 @@ def _distance_cost(reaches: np.ndarray) -> np.ndarray:
     Where teeth touch a lip its ridge is weak, and that of the other lip must not stand in for it.
     """
     return reaches**2 + _STEEP * reaches**4
-
-
-def _smoothness(ring: np.ndarray, unit: float, settings: SearchSettings) -> np.ndarray:
-    """(n,) cost of one squared step between sample k and the next."""
-    apart = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) / unit
-    return settings.smooth_weight * (settings.step / np.maximum(apart, settings.step)) ** 2
 
 
 def _refined(
