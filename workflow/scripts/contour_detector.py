@@ -64,11 +64,12 @@ def main(snakemake) -> None:
             required=cfg.kind == "boosted",
             **place,
         )
+    # The track comes with the job of a take that nobody labelled: labels of which none serves
+    # leave the landmarks.
+    tracked = cfg.kind != "landmarks" and snakemake.input.get("fit")
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
-    elif snakemake.input.get(
-        "fit"
-    ):  # labels of which none serves leave a take without a track here
+    elif tracked:
         detector = from_track(snakemake, cfg, source, track)
     if detector is None:
         detector = LandmarkRidgeDetector(
