@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.unit.mouths import draw_mouth, ellipse
-from vermilion.contours.curves import loop_spline, smoothed_halves
+from vermilion.contours.curves import (
+    filled,
+    loop_spline,
+    outward_normals,
+    smoothed_halves,
+    uncrossed,
+)
 from vermilion.contours.detector import load_detector
-from vermilion.contours.ridges import blurred_colours
+from vermilion.contours.ridges import Inside, blurred_colours
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
 from vermilion.evaluation.contour_error import distance_to_polyline
 
@@ -72,6 +80,47 @@ def test_a_frame_may_leave_the_takes_border_by_its_reach(detector):
     assert distance_to_polyline(far, label.outer.points_px, True).mean() > 15.0
 
 
+@pytest.mark.parametrize("rolled_px", [-9.0, 9.0])
+def test_a_rolled_lip_is_found_where_it_ends(detector, rolled_px):
+    """Tracks do not follow rolls: the ring keeps the height of lips that are rolled in or out."""
+    picture, landmarks, label = draw_mouth(6.0, 25.0, seed=9)
+    tracked = rings(6.0, 25.0 - rolled_px, 0.0, 3.0)
+    tracked[0][40:] = rings(6.0, 25.0)[0][40:]  # the upper lip alone
+    start = tracked[0] + 6.0 * outward_normals(tracked[0])  # what all frames share
+    along = slice(5, 36)
+    for reach, most in ((0.05, 1.0), (0.0001, np.inf)):
+        found = replace(detector, lip_reach=reach)
+        outer, _ = borders_px(found, picture, landmarks, (start, tracked[1]))
+        away = distance_to_polyline(
+            outer[3 * along.start : 3 * along.stop], label.outer.points_px, True
+        )
+        assert away.mean() < most
+    assert away.mean() > 2.0  # place by place alone, it is not
+
+
+@pytest.mark.parametrize(("dark", "touching"), [(0.05, 0.0), (0.3, 0.5), (0.9, 1.0)])
+def test_what_is_nearly_black_between_lips_is_a_hole_and_no_contact(detector, dark, touching):
+    """`dark` is the line's lightness against the lips'; all of it lies within the reach of contacts."""
+    rows = np.abs(np.arange(240) + 0.5 - CENTRE[1])
+    lightness = np.repeat(np.where(rows < 3, 0.4 * dark, 0.4)[:, None], 240, axis=1)
+    lip = filled(ellipse(CENTRE, WIDTH, 26.0, 80), 240)
+    planes = [plane.astype(np.float32) for plane in (lightness, lightness, lip, lip)]
+    curve = ellipse(CENTRE, 0.75 * WIDTH, 0.01, 80)
+    points = curve[:, None] + np.array([0.0, 1.0]) * np.arange(-9, 10)[:, None]
+    contact = detector._contact(curve, points, Inside(*planes))
+    np.testing.assert_allclose(contact, touching, atol=0.01)
+
+
+def test_halves_that_pass_each_other_meet():
+    curve = ellipse(CENTRE, WIDTH, 10.0, 80)
+    np.testing.assert_array_equal(uncrossed(curve), curve)
+    crossed = curve.copy()
+    crossed[1:9, 1], crossed[:71:-1, 1] = curve[:71:-1, 1], curve[1:9, 1]
+    met = uncrossed(crossed)
+    np.testing.assert_allclose(met[1:9], met[:71:-1])
+    np.testing.assert_array_equal(met[9:72], curve[9:72])
+
+
 def test_a_shadow_that_one_light_casts_on_the_skin_is_not_lip(detector):
     picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
     rows = np.arange(240)
@@ -92,7 +141,9 @@ def test_maps_are_ridges_about_the_true_contours(detector):
 
 
 def test_the_least_reaches_and_the_least_region_serve():
-    detector = TrackRidgeDetector(interocular_size_px=60.0, reach=0.001, frame_reach=0.001)
+    detector = TrackRidgeDetector(
+        interocular_size_px=60.0, reach=0.001, frame_reach=0.001, lip_reach=0.001
+    )
     found = learnt(detector, outer_px=0.0, inner_px=0.0, reach=0.001)
     picture, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
     maps = found.likelihood(picture, landmarks, rings(8.0, 27.0))

@@ -33,6 +33,7 @@ def from_track(snakemake, cfg, source, track):
         cfg.edge_weight,
         cfg.stiffness,
         options.frame_reach,
+        options.lip_reach,
     )
 
     def lips_px(frame: int) -> tuple[np.ndarray, np.ndarray]:

@@ -44,6 +44,12 @@ class TrackRidgeConfig(StageConfig):
         le=0.2,
         description="How far from the take's outer border a frame's may lie; half as far again at most.",
     )
+    lip_reach: float = Field(
+        0.05,
+        gt=0,
+        le=0.3,
+        description="How far from there a lip as a whole may end in a frame, as it rolls.",
+    )
     inner_reach: float = Field(
         0.05, gt=0, le=0.3, description="How far from where it lies on average the inner border is."
     )

@@ -46,6 +46,16 @@ def smoothed_halves(ring: np.ndarray, passes: int) -> np.ndarray:
     return np.concatenate(parts)
 
 
+def uncrossed(curve: np.ndarray) -> np.ndarray:
+    """A mouth's curve (n, 2), its corners samples 0 and n / 2; halves that pass each other meet instead."""
+    half, curve = len(curve) // 2, curve.copy()
+    upper, lower = curve[1:half], curve[:half:-1]
+    crossed = upper[:, 1] > lower[:, 1]
+    middle = 0.5 * (upper + lower)[crossed]
+    upper[crossed], lower[crossed] = middle, middle
+    return curve
+
+
 def gap(curve: np.ndarray) -> np.ndarray:
     """Distance (n,) of each point of a closed curve to the half that it does not belong to."""
     half = len(curve) // 2

@@ -23,6 +23,8 @@ from vermilion.contours.region import MouthRegion
 
 BLUR_PX = 1.0  # of the colours
 CONTACT = 0.03  # a mouth open by less may be closed: per inter-ocular distance
+#: An opening is a hole: so dark between the lips, per their lightness, is one; above, shade of a contact.
+HOLE = (0.2, 0.4)
 LINE_SHARE = 0.7  # what the dark line counts there, against the fall
 
 
@@ -113,7 +115,7 @@ class RidgeDetector(ContourDetector):
         fall = np.maximum(-np.gradient(sampled(plane, points), step_px, axis=1), 0.0)
         fall = np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
         if inside is not None:
-            near = np.exp(-((gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))[:, None]
+            near = self._contact(curve, points, inside)[:, None]
             line = sampled(inside.contact, points)
             line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
             fall += LINE_SHARE * near * (line - fall)
@@ -124,6 +126,14 @@ class RidgeDetector(ContourDetector):
         rows = np.arange(len(curve))
         moved = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
         return moved, np.minimum(fall[rows, chosen], 1.0)
+
+    def _contact(self, curve: np.ndarray, points: np.ndarray, inside: Inside) -> np.ndarray:
+        """How far (n,) lips may touch at a curve (n, 2), whose normals' places are (n, T, 2)."""
+        near = np.exp(-((gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))
+        lightness, lip = sampled(inside.lightness, points), sampled(inside.lip, points) > 0.5
+        usual = np.median(lightness[lip]) if lip.any() else 1.0
+        darkest = np.where(lip, lightness, np.inf).min(axis=1) / max(usual, 1e-6)
+        return near * np.clip((darkest - HOLE[0]) / (HOLE[1] - HOLE[0]), 0.0, 1.0)
 
     def _creases(
         self, curve: np.ndarray, normals: np.ndarray, inside: Inside, step_px: float, count: int

@@ -23,6 +23,7 @@ from vermilion.contours.curves import (
     sampled,
     smoothed_halves,
     smoothed_ring,
+    uncrossed,
 )
 from vermilion.contours.lip_planes import dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
@@ -38,6 +39,9 @@ BESIDE = (0.01, 0.04)
 ALONG = 3 / 80
 LEAST_SPREAD = 0.02  # of a colour about its mean
 ROUNDS, INNER_ROUNDS = 6, 2
+NEARLY = (
+    0.01  # a lip that is moved as a whole meets its border so nearly (per inter-ocular distance)
+)
 EDGE_PASSES = 6  # binomial passes over the tracked rings, whose edges are the mesh's
 
 
@@ -47,6 +51,7 @@ class TrackRidgeDetector(RidgeDetector):
 
     Attributes:
         frame_reach: how far a frame's outer border may lie from the take's, per inter-ocular distance.
+        lip_reach: how far a lip as a whole may end from there, as it rolls, per inter-ocular distance.
         outer_offset: (n,) the take's outer border from the tracked one, outwards, per inter-ocular
             distance.
         direction, middle: (n, 3) and (n,): a colour c at sample k is lip where
@@ -59,6 +64,7 @@ class TrackRidgeDetector(RidgeDetector):
 
     reach: float = 0.05
     frame_reach: float = 0.02
+    lip_reach: float = 0.05
     outer_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
     direction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     middle: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -87,13 +93,35 @@ class TrackRidgeDetector(RidgeDetector):
         ring, size = smoothed_halves(region.outer_px, EDGE_PASSES), self.interocular_size_px
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
-        start, normals = self.outer_offset * size, outward_normals(ring)
+        normals = outward_normals(ring)
+        start = self.outer_offset * size + self.rolled(colours, ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
         fall = scaled(falls(seen[None], self.direction, self.middle)[0])
         cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(ring, STEP_PX, self.stiffness))
         offset = smoothed_ring(start + places[chosen], 2)
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
+
+    def rolled(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
+        """How far (n,) px each lip as a whole ends from the take's border in a frame.
+
+        Rolls and presses hide a good part of a lip, which a track does not follow: farther than a
+        border may be looked for place by place without taking another edge for it.
+        """
+        size, half = self.interocular_size_px, len(ring) // 2
+        reach = self.lip_reach * size
+        count = max(int(1.5 * reach / STEP_PX), 1)
+        places = STEP_PX * np.arange(-count, count + 1)
+        shape = np.sqrt(np.sin(np.pi * np.arange(half) / half))  # a lip ends in the corners
+        along = self.outer_offset[:, None] * size + np.tile(shape, 2)[:, None] * places
+        fall = falls(unwrapped(colours, ring, along)[None], self.direction, self.middle)[0]
+        near = NEARLY * size / STEP_PX
+        fall = scaled(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
+        result = np.zeros(len(ring))
+        for lip in (slice(0, half), slice(half, None)):
+            gain = self.edge_weight * np.average(fall[lip], axis=0, weights=shape)
+            result[lip] = places[np.argmax(gain - (places / reach) ** 2)] * shape
+        return result
 
     def inner_border(
         self, colours: np.ndarray, region: MouthRegion, outer: np.ndarray
@@ -116,7 +144,7 @@ class TrackRidgeDetector(RidgeDetector):
                 once.step_px,
                 Inside(colours[0], contact, planes["flesh"], lip),
             )
-        return curve, strength
+        return uncrossed(curve), strength
 
 
 def learn_from_take(
