@@ -11,21 +11,6 @@ from vermilion.faces.procedural import tracker_model
 from vermilion.mesh import boundary_edges, triangle_areas, unique_edges, vertex_normals
 
 
-@pytest.fixture
-def studio() -> FaceModel:
-    return heads.studio()
-
-
-@pytest.fixture
-def template() -> FaceModel:
-    return heads.template()
-
-
-@pytest.fixture
-def tracker() -> FaceModel:
-    return heads.tracker()
-
-
 @pytest.fixture(params=["studio", "template", "tracker"])
 def part(request) -> FaceModel:
     return getattr(heads, request.param)()

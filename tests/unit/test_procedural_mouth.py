@@ -5,27 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests import heads
 from tests.unit.procedural_mouth import aperture_mm, lip_gap_mm, mouth, visible_red_mm2
-from vermilion.faces.model import FaceModel
 from vermilion.faces.procedural import studio_model
 from vermilion.raycast import RayCaster
-
-
-@pytest.fixture
-def studio() -> FaceModel:
-    return heads.studio()
-
-
-@pytest.fixture
-def template() -> FaceModel:
-    return heads.template()
-
-
-@pytest.fixture
-def tracker() -> FaceModel:
-    return heads.tracker()
-
 
 # -- expressions ---------------------------------------------------------------------------------
 
