@@ -17,7 +17,7 @@ from vermilion.contours.curves import (
 )
 from vermilion.contours.detector import load_detector
 from vermilion.contours.ridges import Inside, blurred_colours
-from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders, mouth_parts
 from vermilion.evaluation.contour_error import distance_to_polyline
 
 CENTRE, WIDTH = (120.0, 150.0), 52.0
@@ -109,6 +109,34 @@ def test_what_is_nearly_black_between_lips_is_a_hole_and_no_contact(detector, da
     points = curve[:, None] + np.array([0.0, 1.0]) * np.arange(-9, 10)[:, None]
     contact = detector._contact(curve, points, Inside(*planes))
     np.testing.assert_allclose(contact, touching, atol=0.01)
+
+
+def test_parts_of_a_mouth_are_full_in_their_middles_and_the_corners_belong_to_no_lip():
+    upper, lower, right, left = mouth_parts(80)
+    middles = [part.argmax() for part in (upper, lower, right, left)]
+    assert middles == [20, 60, 0, 40]
+    np.testing.assert_allclose([upper[20], lower[60], right[0], left[40]], 1)
+    np.testing.assert_array_equal(upper[40:], 0)
+    np.testing.assert_array_equal(lower[:40], 0)
+    np.testing.assert_allclose([upper[0], lower[40], right[40], left[0]], 0, atol=1e-7)
+    np.testing.assert_allclose(right[1:], right[:0:-1], atol=1e-7)  # as far along either lip
+    np.testing.assert_allclose(np.roll(right, 40), left)
+
+
+def test_a_corner_that_comes_in_is_found(detector):
+    """Tracks keep mouths that open wide too wide."""
+    picture, landmarks, label = draw_mouth(14.0, 30.0, seed=9)
+    outer, inner = rings(14.0, 30.0, 0.0, 3.0)
+    out = outer + 6.0 * outward_normals(outer)
+    out += 10.0 * mouth_parts(80)[2][:, None] * outward_normals(outer)
+    near = np.r_[:18, -18:0]  # of 240
+    error = []
+    for reach in (0.05, 0.0001):
+        found = replace(detector, lip_reach=reach)
+        border, _ = borders_px(found, picture, landmarks, (out, inner))
+        error.append(distance_to_polyline(border[near], label.outer.points_px, True).mean())
+    assert error[0] < 0.5
+    assert error[1] > 1.5
 
 
 def test_halves_that_pass_each_other_meet():

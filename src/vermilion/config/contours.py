@@ -48,7 +48,7 @@ class TrackRidgeConfig(StageConfig):
         0.05,
         gt=0,
         le=0.3,
-        description="How far from there a lip as a whole may end in a frame, as it rolls.",
+        description="How far from there a lip or a corner as a whole may lie in a frame, as where lips roll.",
     )
     inner_reach: float = Field(
         0.05, gt=0, le=0.3, description="How far from where it lies on average the inner border is."

@@ -51,7 +51,7 @@ class TrackRidgeDetector(RidgeDetector):
 
     Attributes:
         frame_reach: how far a frame's outer border may lie from the take's, per inter-ocular distance.
-        lip_reach: how far a lip as a whole may end from there, as it rolls, per inter-ocular distance.
+        lip_reach: how far a lip or a corner as a whole may lie from there, per inter-ocular distance.
         outer_offset: (n,) the take's outer border from the tracked one, outwards, per inter-ocular
             distance.
         direction, middle: (n, 3) and (n,): a colour c at sample k is lip where
@@ -94,7 +94,7 @@ class TrackRidgeDetector(RidgeDetector):
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
         normals = outward_normals(ring)
-        start = self.outer_offset * size + self.rolled(colours, ring)
+        start = self.outer_offset * size + self.moved_parts(colours, ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
         fall = scaled(falls(seen[None], self.direction, self.middle)[0])
         cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
@@ -102,25 +102,26 @@ class TrackRidgeDetector(RidgeDetector):
         offset = smoothed_ring(start + places[chosen], 2)
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
 
-    def rolled(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
-        """How far (n,) px each lip as a whole ends from the take's border in a frame.
+    def moved_parts(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
+        """How far (n,) px each lip and each corner as a whole lies from the take's border in a frame.
 
-        Rolls and presses hide a good part of a lip, which a track does not follow: farther than a
-        border may be looked for place by place without taking another edge for it.
+        Rolls and presses hide a good part of a lip, and corners come in as a mouth opens wide, which
+        a track does not follow: farther than a border may be looked for place by place without
+        taking another edge for it.
         """
-        size, half = self.interocular_size_px, len(ring) // 2
+        size = self.interocular_size_px
         reach = self.lip_reach * size
         count = max(int(1.5 * reach / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
-        shape = np.sqrt(np.sin(np.pi * np.arange(half) / half))  # a lip ends in the corners
-        along = self.outer_offset[:, None] * size + np.tile(shape, 2)[:, None] * places
-        fall = falls(unwrapped(colours, ring, along)[None], self.direction, self.middle)[0]
-        near = NEARLY * size / STEP_PX
-        fall = scaled(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
+        offset = self.outer_offset * size
         result = np.zeros(len(ring))
-        for lip in (slice(0, half), slice(half, None)):
-            gain = self.edge_weight * np.average(fall[lip], axis=0, weights=shape)
-            result[lip] = places[np.argmax(gain - (places / reach) ** 2)] * shape
+        for part in mouth_parts(len(ring)):
+            along = (offset + result)[:, None] + part[:, None] * places
+            fall = falls(unwrapped(colours, ring, along)[None], self.direction, self.middle)[0]
+            near = NEARLY * size / STEP_PX
+            fall = scaled(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
+            gain = self.edge_weight * np.average(fall, axis=0, weights=part)
+            result += part * places[np.argmax(gain - (places / reach) ** 2)]
         return result
 
     def inner_border(
@@ -145,6 +146,17 @@ class TrackRidgeDetector(RidgeDetector):
                 Inside(colours[0], contact, planes["flesh"], lip),
             )
         return uncrossed(curve), strength
+
+
+def mouth_parts(n: int) -> np.ndarray:
+    """How much each of a ring's n samples belongs to the upper and the lower lip and the corners, (4, n)."""
+    along = np.sin(2 * np.pi * np.arange(n // 2) / n)
+    lip, none = np.sqrt(along), np.zeros(n // 2)
+    corner = np.append(
+        np.roll(1 - along, n // 4), none
+    )  # about sample n / 4, where a lip is fullest
+    right, left = (np.roll(corner, turn) for turn in (-(n // 4), n // 4))
+    return np.stack([np.append(lip, none), np.append(none, lip), right, left])
 
 
 def learn_from_take(
