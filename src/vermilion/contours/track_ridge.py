@@ -39,9 +39,7 @@ BESIDE = (0.01, 0.04)
 ALONG = 3 / 80
 LEAST_SPREAD = 0.02  # of a colour about its mean
 ROUNDS, INNER_ROUNDS = 6, 2
-NEARLY = (
-    0.01  # a lip that is moved as a whole meets its border so nearly (per inter-ocular distance)
-)
+NEARLY = 0.01  # a part moved as a whole meets its border so nearly, per inter-ocular distance
 EDGE_PASSES = 6  # binomial passes over the tracked rings, whose edges are the mesh's
 
 
@@ -152,9 +150,7 @@ def mouth_parts(n: int) -> np.ndarray:
     """How much each of a ring's n samples belongs to the upper and the lower lip and the corners, (4, n)."""
     along = np.sin(2 * np.pi * np.arange(n // 2) / n)
     lip, none = np.sqrt(along), np.zeros(n // 2)
-    corner = np.append(
-        np.roll(1 - along, n // 4), none
-    )  # about sample n / 4, where a lip is fullest
+    corner = np.append(np.roll(1 - along, n // 4), none)  # as if about sample n / 4
     right, left = (np.roll(corner, turn) for turn in (-(n // 4), n // 4))
     return np.stack([np.append(lip, none), np.append(none, lip), right, left])
 
