@@ -8,7 +8,8 @@ contour is the visible border of the vermilion, the true inner one that of the o
 sees the true mesh. Contours are looked for from **C** of the run, in the head frame, as the workflow
 does, or from the landmarks' curves where the take is not yet tracked, in the maps of
 
-- `boosted`: boosted edge learning, trained anew on the take's labelled frames but those measured;
+- `boosted`: boosted edge learning, trained anew on the take's labelled frames, as `auto` does, and
+  measured on the others; before the take is tracked its labels count as drawn;
 - `track`: the tracked lips moved to the border of the lips' colour, learnt from the take;
 - `landmarks`: the landmarks' curves moved there.
 
@@ -28,8 +29,9 @@ import numpy as np
 import pandas as pd
 
 from vermilion.camera import read_cameras
-from vermilion.config.contours import TrackRidgeConfig
+from vermilion.config.contours import ContourDetectorConfig, TrackRidgeConfig
 from vermilion.contours.curves import loop_spline
+from vermilion.contours.label_offset import without_lean
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
@@ -152,12 +154,10 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     width_px = float(np.median([np.ptp(loop["outer"][:, 0]) for loop in loops]))
     labels = label_paths(capture, camera.name)
     labelled = [
-        LabelledFrame(source.read(camera.name, f), track.points_px[f], read_label(path))
+        LabelledFrame(source.read(camera.name, f), track.points_px[f], read_label(path), f)
         for f, path in labels.items()
     ]
     detectors = {"landmarks": LandmarkRidgeDetector()}
-    if labelled:
-        detectors["boosted"] = train_detector(labelled, TrainingSettings())
     rings = dict.fromkeys(range(len(true_mm)))
     if tracked:
         lips = TrackedLips.of(tracked[0])
@@ -171,6 +171,10 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
             rings.__getitem__,
             section.reach,
         )
+        tolerance = ContourDetectorConfig().label_tolerance
+        labelled, _ = without_lean(labelled, detectors["track"], rings.get, tolerance)
+    if labelled:
+        detectors["boosted"] = train_detector(labelled, TrainingSettings())
     rows = []
     for frame in range(0, len(true_mm), every):
         if frame in labels:

@@ -34,6 +34,21 @@ CFG = {
 NAME = {"subject": "s1", "take": "phone"}
 
 
+def of_take(root) -> dict:
+    """What the detector of the take reads."""
+    return {
+        "landmarks": [root / "landmarks.npz"],
+        "tracker": root / "tracker.npz",
+        "fit": root / "fit.npz",
+        "coarse": [root / "000000-000004.npy"],
+    }
+
+
+def to(folder) -> dict:
+    """What it writes."""
+    return {"detector": folder / "detector.npz", "quality": folder / "labels.tsv"}
+
+
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
     """Five frames of a drawn mouth, three of them labelled, one damaged, and its coarse track."""
@@ -70,11 +85,7 @@ def take(tmp_path_factory):
         "frames": FRAMES,
     }
     run_script(
-        "contour_detector",
-        wildcards=NAME,
-        params=params,
-        input={"landmarks": [root / "landmarks.npz"]},
-        output={"detector": root / "detector.npz"},
+        "contour_detector", wildcards=NAME, params=params, input=of_take(root), output=to(root)
     )
     run_stages(root, params, "000000-000004", FRAMES)
     return root, params
@@ -195,13 +206,8 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
     from vermilion.errors import InputError
 
     root, params = take
-    track = {
-        "landmarks": [root / "landmarks.npz"],
-        "tracker": root / "tracker.npz",
-        "fit": root / "fit.npz",
-        "coarse": [root / "000000-000004.npy"],
-    }
-    job = {"wildcards": NAME, "output": {"detector": tmp_path / "detector.npz"}}
+    track = of_take(root)
+    job = {"wildcards": NAME, "output": to(tmp_path)}
     bare = {**params, "capture": str(tmp_path)}
     run_script("contour_detector", params=bare, input=track, **job)
     assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
@@ -228,9 +234,9 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
         run_script("contour_detector", params=demanding, input=track, **job)
 
 
-def test_labels_of_which_none_serves_leave_the_landmarks(take, tmp_path):
+def test_labels_of_which_none_serves_leave_the_track(take, tmp_path):
     from vermilion.contours.detector import load_detector
-    from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+    from vermilion.contours.track_ridge import TrackRidgeDetector
 
     root, params = take
     lost = LandmarkTrack.load(root / "landmarks.npz")
@@ -240,10 +246,46 @@ def test_labels_of_which_none_serves_leave_the_landmarks(take, tmp_path):
         "contour_detector",
         wildcards=NAME,
         params=params,
-        input={"landmarks": [tmp_path / "lost.npz"]},
-        output={"detector": tmp_path / "detector.npz"},
+        input={**of_take(root), "landmarks": [tmp_path / "lost.npz"]},
+        output=to(tmp_path),
     )
-    assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)
+    assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
+    said = read_table(tmp_path / "labels.tsv")
+    assert said["frame"].tolist() == list(LABELLED)
+    assert said["reason"].str.contains("left out").all()
+
+
+def test_labels_beside_the_border_are_moved_and_flagged_and_a_damaged_frame_left_out(
+    take, tmp_path
+):
+    root, params = take
+    for frame in FRAMES:
+        label = root / f"capture/labels/contours/cam/{frame:06d}.json"
+        picture = tmp_path / f"frames/cam/{frame:06d}.png"
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        picture.write_bytes((root / f"capture/frames/cam/{frame:06d}.png").read_bytes())
+        if frame in LABELLED:
+            drawn = json.loads(label.read_text())
+            points = np.array(drawn["outer"]["points"])
+            middle = points.mean(axis=0)
+            drawn["outer"]["points"] = (middle + 0.9 * (points - middle)).tolist()
+            label = tmp_path / f"labels/contours/cam/{frame:06d}.json"
+            label.parent.mkdir(parents=True, exist_ok=True)
+            label.write_text(json.dumps(drawn))
+    picture = tmp_path / "frames/cam/000002.png"
+    picture.write_bytes(picture.read_bytes()[:500])
+    run_script(
+        "contour_detector",
+        wildcards=NAME,
+        params={**params, "capture": str(tmp_path), "source": str(tmp_path)},
+        input=of_take(root),
+        output=to(tmp_path),
+    )
+    said = read_table(tmp_path / "labels.tsv")
+    assert said["frame"].tolist() == [0, 1, 2]
+    assert said["reason"][:2].str.contains("inside the border of the lips' colour: moved").all()
+    assert "unreadable" in said["reason"][2]
+    assert (said["outer_offset"][:2] * 200).between(-5.0, -1.5).all()  # 2 to 5 px
 
 
 def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_path):
@@ -259,12 +301,7 @@ def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_p
         "contour_detector",
         wildcards=NAME,
         params={**params, "capture": str(tmp_path), "source": str(tmp_path)},
-        input={
-            "landmarks": [root / "landmarks.npz"],
-            "tracker": root / "tracker.npz",
-            "fit": root / "fit.npz",
-            "coarse": [root / "000000-000004.npy"],
-        },
-        output={"detector": tmp_path / "detector.npz"},
+        input=of_take(root),
+        output=to(tmp_path),
     )
     assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)

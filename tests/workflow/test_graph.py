@@ -50,8 +50,8 @@ def test_only_the_evaluation_reads_external_truth(fresh_project, data_root):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("detector", "follow"), [({}, False), ({"kind": "track"}, True)])
-def test_contours_wait_for_the_track_where_nobody_labelled(fresh_project, detector, follow):
+@pytest.mark.parametrize(("detector", "follow"), [({}, True), ({"kind": "boosted"}, False)])
+def test_contours_wait_for_the_track_unless_labels_count_as_drawn(fresh_project, detector, follow):
     contours = json.dumps({"detector": detector})
     run = fresh_project.snakemake("--dry-run", "--config", f"contours={contours}")
     jobs = jobs_of(run.stdout + run.stderr)

@@ -177,7 +177,7 @@ def test_line_of_code_in_the_tracking_module(finished):
     path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
         jobs = set(finished.would_run())
-    contours = {"contour_detector", "contours"}  # they read a track where nobody labelled
+    contours = {"contour_detector", "contours"}  # they start from the track or are held against it
     assert jobs == AFTER_TRACKING | contours | {"picture_identity", "tracking", "tracking_topology"}
 
 

@@ -15,15 +15,12 @@ def contour_labels(wildcards):
     return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
 
 
-def by_track(wildcards):
-    """Whether a take's contours are looked for from its tracked lips."""
-    kind = CONFIG.contours.detector.kind
-    return kind == "track" or (kind == "auto" and not contour_labels(wildcards))
-
-
 def tracked_lips(wildcards):
-    """The track of a take whose contours start from it: of the job's chunk, or of all."""
-    if not by_track(wildcards):
+    """The track of a take whose contours start from it, or whose labels are held against it.
+
+    Of the job's chunk, or of all.
+    """
+    if CONFIG.contours.detector.kind in ("boosted", "landmarks"):
         return {}
     subject, take = wildcards.subject, wildcards.take
     parts = [wildcards.chunk] if "chunk" in wildcards.keys() else chunks(subject, take)
@@ -36,7 +33,7 @@ def tracked_lips(wildcards):
 
 
 rule contour_detector:
-    """Trains the inner and outer contour detectors of a take: contours/detector.npz."""
+    """Trains the inner and outer contour detectors of a take: contours/detector.npz, quality of labels."""
     input:
         unpack(tracked_lips),
         pictures=mono_pictures,
@@ -44,6 +41,7 @@ rule contour_detector:
         labels=contour_labels,
     output:
         detector=R + "/takes/{subject}/{take}/contours/detector.npz",
+        quality=R + "/takes/{subject}/{take}/contours/quality/labels.tsv",
     log:
         R + "/logs/contour_detector/{subject}-{take}.log",
     benchmark:

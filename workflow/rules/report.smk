@@ -35,6 +35,8 @@ def quality_files():
             take.take,
         )
     ]
+    labels = R + "/takes/{subject}/{take}/contours/quality/labels.tsv"
+    paths += of_takes(labels, used_takes(STAGE_FOLDERS["contours"]))
     people = subjects("tattoo")
     paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
     paths += [f"{R}/subjects/{name}/scan/quality/scan.tsv" for name in CONFIG.tracking.scans]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vermilion.config.contours import ContourDetectorConfig
+from vermilion.contours.label_offset import without_lean
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
@@ -12,18 +13,32 @@ from vermilion.features.tracked_lips import TrackedLips
 from vermilion.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.logfile import log_to
+from vermilion.quality import write_quality
 from vermilion.sequences import locate, read_sequence
 from vermilion.tracking.result import TrackedTake
 
 
-def from_track(snakemake, cfg, source, track):
+class TrackedRings:
+    """The tracked lips of a take in its pictures."""
+
+    def __init__(self, inputs, landmarks: LandmarkTrack):
+        self.fit = TrackedTake.load(inputs.fit)
+        self.lips = TrackedLips.of(FaceModel.load(inputs.tracker))
+        self.coarse = inputs.coarse
+        served = landmarks.valid & np.isin(landmarks.frames, self.fit.frames[self.fit.valid])
+        self.frames = landmarks.frames[served].tolist()
+
+    def __call__(self, frame: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Outer and inner ring (n, 2) px of a frame; None where it is not tracked."""
+        if frame not in self.frames:
+            return None
+        ((path, row),) = locate(self.coarse, [frame]).values()
+        return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
+
+
+def from_track(cfg, camera, source, track, rings):
     """The detector that a take's own pictures and track tell; None where no frame serves."""
-    options, inputs = cfg.track, snakemake.input
-    fit = TrackedTake.load(inputs.fit)
-    lips = TrackedLips.of(FaceModel.load(inputs.tracker))
-    seen = track.frames[track.valid & np.isin(track.frames, fit.frames[fit.valid])]
-    frames = sorted(evenly(seen.tolist(), options.frames))
-    meshes = locate(inputs.coarse, frames)
+    options = cfg.track
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector(
         cfg.interocular_size_px,
@@ -35,45 +50,42 @@ def from_track(snakemake, cfg, source, track):
         options.frame_reach,
         options.lip_reach,
     )
-
-    def lips_px(frame: int) -> tuple[np.ndarray, np.ndarray]:
-        path, row = meshes[frame]
-        return lips.rings_px(read_sequence(path)[row], fit.camera)
-
     return learn_from_take(
         detector,
-        frames,
-        lambda frame: source.read(snakemake.params.camera, frame),
+        sorted(evenly(rings.frames, options.frames)),
+        lambda frame: source.read(camera, frame),
         landmarks.__getitem__,
-        lips_px,
+        rings,
         options.reach,
     )
 
 
 def main(snakemake) -> None:
     cfg = ContourDetectorConfig(**snakemake.params.cfg["contours.detector"])
-    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    place, camera = {"subject": subject, "take": take}, snakemake.params.camera
     source = open_frames(snakemake.params.source, **place)
     track = LandmarkTrack.load(snakemake.input.landmarks)
-    labelled, detector = [], None
+    labelled, rows, by_track = [], [], None
     if cfg.kind in ("auto", "boosted"):
-        labelled = read_labelled(
+        labelled, rows = read_labelled(
             snakemake.params.capture,
-            snakemake.params.camera,
+            camera,
             source,
             track,
             required=cfg.kind == "boosted",
             **place,
         )
-    # The track comes with the job of a take that nobody labelled: labels of which none serves
-    # leave the landmarks.
-    tracked = cfg.kind != "landmarks" and snakemake.input.get("fit")
+    if cfg.kind in ("auto", "track"):
+        rings = TrackedRings(snakemake.input, track)
+        by_track = from_track(cfg, camera, source, track, rings)
+    if labelled and by_track:
+        labelled, said = without_lean(labelled, by_track, rings, cfg.label_tolerance)
+        rows += said
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
-    elif tracked:
-        detector = from_track(snakemake, cfg, source, track)
-    if detector is None:
-        detector = LandmarkRidgeDetector(
+    else:
+        detector = by_track or LandmarkRidgeDetector(
             cfg.interocular_size_px,
             cfg.margin,
             cfg.ridge_width,
@@ -82,7 +94,11 @@ def main(snakemake) -> None:
             cfg.stiffness,
         )
     detector.save(snakemake.output.detector)
+    rows.sort(key=lambda row: row.frame)
+    write_quality(snakemake.output.quality, subject, take, "contour labels", rows)
     print(f"{type(detector).__name__} from {len(labelled)} labelled frames")
+    for reason in sorted({row.reason for row in rows if row.reason}):
+        print(reason)
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ from vermilion.errors import InputError
 from vermilion.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.progress import progress
+from vermilion.quality import QualityRow
 
 
 @dataclass(frozen=True)
@@ -95,11 +96,12 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class LabelledFrame:
-    """A picture (h, w, 3) linear RGB, its landmarks (66, 2) and the contours drawn on it."""
+    """A picture (h, w, 3) linear RGB, its landmarks (66, 2), the contours drawn on it, its number."""
 
     linear_rgb: np.ndarray
     landmarks_px: np.ndarray
     label: ContourLabel
+    number: int = 0
 
 
 def read_labelled(
@@ -109,8 +111,8 @@ def read_labelled(
     landmarks: LandmarkTrack,
     required: bool,
     **place,
-) -> list[LabelledFrame]:
-    """The labelled frames of a take's monocular camera whose landmarks were found.
+) -> tuple[list[LabelledFrame], list[QualityRow]]:
+    """The labelled frames of a take's monocular camera whose landmarks were found, and the others.
 
     Args:
         capture: the capture folder, with `labels/contours/<camera>/`.
@@ -120,15 +122,22 @@ def read_labelled(
         required: raise InputError where there are none.
         place: subject and take, for messages.
     """
-    labelled = []
+    labelled, left_out = [], []
     for frame, path in label_paths(capture, camera).items():
+        drawn = read_label(path, camera=camera, frame=frame, **place)
         index = np.flatnonzero((landmarks.frames == frame) & landmarks.valid)
         if len(index) == 0:
-            print(f"label of frame {frame} left out: not in the take, or no landmarks")
+            left_out.append(
+                QualityRow(frame, reason="label left out: not in the take, or no landmarks")
+            )
             continue
-        drawn = read_label(path, camera=camera, frame=frame, **place)
+        try:
+            picture = source.read(camera, frame)
+        except InputError as error:
+            left_out.append(QualityRow(frame, reason=f"label left out: unreadable: {error}"))
+            continue
         points = landmarks.points_px[index[0]]
-        labelled.append(LabelledFrame(source.read(camera, frame), points, drawn))
+        labelled.append(LabelledFrame(picture, points, drawn, frame))
     if required and not labelled:
         raise InputError(
             "no usable contour labels",
@@ -138,7 +147,7 @@ def read_labelled(
             camera=camera,
             **place,
         )
-    return labelled
+    return labelled, left_out
 
 
 @dataclass(frozen=True)
