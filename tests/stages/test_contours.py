@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -259,25 +260,20 @@ def test_labels_beside_the_border_are_moved_and_flagged_and_a_damaged_frame_left
     take, tmp_path
 ):
     root, params = take
-    for frame in FRAMES:
-        label = root / f"capture/labels/contours/cam/{frame:06d}.json"
-        picture = tmp_path / f"frames/cam/{frame:06d}.png"
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        picture.write_bytes((root / f"capture/frames/cam/{frame:06d}.png").read_bytes())
-        if frame in LABELLED:
-            drawn = json.loads(label.read_text())
-            points = np.array(drawn["outer"]["points"])
-            middle = points.mean(axis=0)
-            drawn["outer"]["points"] = (middle + 0.9 * (points - middle)).tolist()
-            label = tmp_path / f"labels/contours/cam/{frame:06d}.json"
-            label.parent.mkdir(parents=True, exist_ok=True)
-            label.write_text(json.dumps(drawn))
-    picture = tmp_path / "frames/cam/000002.png"
+    capture = tmp_path / "capture"
+    shutil.copytree(root / "capture", capture)
+    for path in (capture / "labels/contours/cam").iterdir():
+        drawn = json.loads(path.read_text())
+        points = np.array(drawn["outer"]["points"])
+        middle = points.mean(axis=0)
+        drawn["outer"]["points"] = (middle + 0.9 * (points - middle)).tolist()
+        path.write_text(json.dumps(drawn))
+    picture = capture / "frames/cam/000002.png"
     picture.write_bytes(picture.read_bytes()[:500])
     run_script(
         "contour_detector",
         wildcards=NAME,
-        params={**params, "capture": str(tmp_path), "source": str(tmp_path)},
+        params={**params, "capture": str(capture), "source": str(capture)},
         input=of_take(root),
         output=to(tmp_path),
     )

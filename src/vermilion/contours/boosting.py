@@ -63,13 +63,12 @@ class Forest:
 
     def log_odds(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Log-odds of being contour at n pixels, (n,) float32."""
+        flat, offsets, starts = self.pool.laid_out(integrals, columns, rows)
         return _log_odds(
-            integrals,
-            columns,
-            rows,
-            self.pool.channel,
-            self.pool.boxes,
+            flat,
+            offsets,
             self.pool.weights,
+            starts,
             self.feature,
             self.threshold,
             self.leaf,
@@ -160,16 +159,17 @@ def bin_features(
     rows: np.ndarray,
 ) -> np.ndarray:
     """Bins of the features at n pixels, (N, n) uint8."""
-    return _bin_features(integrals, columns, rows, pool.channel, pool.boxes, pool.weights, edges)
+    flat, offsets, starts = pool.laid_out(integrals, columns, rows)
+    return _bin_features(flat, offsets, pool.weights, starts, edges)
 
 
 @numba.njit(cache=True)
-def _bin_features(integrals, columns, rows, channel, boxes, weights, edges):
-    codes = np.empty((len(channel), len(columns)), dtype=np.uint8)
-    for f in range(len(channel)):
+def _bin_features(flat, offsets, weights, starts, edges):
+    codes = np.empty((len(offsets), len(starts)), dtype=np.uint8)
+    for f in range(len(offsets)):
         limits = edges[f]
-        for i in range(len(columns)):
-            value = box_feature(integrals, columns[i], rows[i], channel[f], boxes[f], weights[f])
+        for i in range(len(starts)):
+            value = box_feature(flat, offsets, weights, f, starts[i])
             code, step = 0, N_BINS // 2
             while step > 0:  # how many edges lie below the value
                 if value > limits[code + step - 1]:
@@ -244,10 +244,8 @@ def _leaves(codes, split, cut):
 
 
 @numba.njit(cache=True)
-def _log_odds(
-    integrals, columns, rows, channel, boxes, weights, feature, threshold, leaf, prior, reject
-):
-    n = len(columns)
+def _log_odds(flat, offsets, weights, starts, feature, threshold, leaf, prior, reject):
+    n = len(starts)
     score = np.full(n, prior, dtype=np.float32)
     alive = np.arange(n)
     n_alive = n
@@ -259,11 +257,8 @@ def _log_odds(
             i = alive[a]
             k = 0
             for _ in range(depth):
-                f = feature[t, k]
-                value = box_feature(
-                    integrals, columns[i], rows[i], channel[f], boxes[f], weights[f]
-                )
-                k = 2 * k + (1 if value <= threshold[t, k] else 2)
+                value = box_feature(flat, offsets, weights, feature[t, k], starts[i])
+                k = 2 * k + 1 + (value > threshold[t, k])
             score[i] += leaf[t, k - (leaf.shape[1] - 1)]
         if (t + 1) % CHECK_EVERY == 0:
             kept = 0

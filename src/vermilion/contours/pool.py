@@ -43,7 +43,24 @@ class FeaturePool:
 
     def evaluate(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Features at n pixels, (N, n) float32, from `integral_images`."""
-        return _evaluate(integrals, columns, rows, self.channel, self.boxes, self.weights)
+        flat, offsets, starts = self.laid_out(integrals, columns, rows)
+        return _evaluate(flat, offsets, self.weights, starts)
+
+    def laid_out(
+        self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For `box_feature`: the integral images flat, and places there.
+
+        Of the corners of each feature's boxes from the pixel, (N, 4, 4): bottom right, top right,
+        bottom left, top left; and of n pixels in the first channel, (n,). One sum a corner then.
+        """
+        _, height, width = integrals.shape
+        plane = self.channel[:, None].astype(np.int64) * (height * width)
+        left, top, right, bottom = np.moveaxis(self.boxes.astype(np.int64), -1, 0)
+        corners = ((bottom, right), (top, right), (bottom, left), (top, left))
+        offsets = np.stack([plane + y * width + x for y, x in corners], axis=-1)
+        starts = (np.asarray(rows) + PAD) * width + np.asarray(columns) + PAD
+        return integrals.reshape(-1), offsets, starts.astype(np.int64)
 
 
 def random_pool(
@@ -99,32 +116,26 @@ def _corner(extent: int, half: int, random: np.random.Generator) -> int:
 
 
 @numba.njit(cache=True, inline="always")
-def box_feature(integrals, column, row, channel, boxes, weights):
-    """One feature at one pixel of the region."""
-    plane = integrals[channel]
-    x, y = column + PAD, row + PAD
+def box_feature(flat, offsets, weights, f, start):
+    """Feature f at one pixel of the region, of what `FeaturePool.laid_out` gives."""
+    # Unused boxes are empty and summed all the same, and places are unsigned: a branch here that is
+    # foreseen wrongly costs more than the sums.
     value = np.float32(0.0)
     for k in range(MAX_BOXES):
-        weight = weights[k]
-        if weight == 0.0:
-            break
-        left, top, right, bottom = boxes[k]
         total = (
-            plane[y + bottom, x + right]
-            - plane[y + top, x + right]
-            - plane[y + bottom, x + left]
-            + plane[y + top, x + left]
+            flat[np.uint64(start + offsets[f, k, 0])]
+            - flat[np.uint64(start + offsets[f, k, 1])]
+            - flat[np.uint64(start + offsets[f, k, 2])]
+            + flat[np.uint64(start + offsets[f, k, 3])]
         )
-        value += weight * np.float32(total)
+        value += weights[f, k] * np.float32(total)
     return value
 
 
 @numba.njit(cache=True)
-def _evaluate(integrals, columns, rows, channel, boxes, weights):
-    values = np.empty((len(channel), len(columns)), dtype=np.float32)
-    for f in range(len(channel)):
-        for i in range(len(columns)):
-            values[f, i] = box_feature(
-                integrals, columns[i], rows[i], channel[f], boxes[f], weights[f]
-            )
+def _evaluate(flat, offsets, weights, starts):
+    values = np.empty((len(offsets), len(starts)), dtype=np.float32)
+    for f in range(len(offsets)):
+        for i in range(len(starts)):
+            values[f, i] = box_feature(flat, offsets, weights, f, starts[i])
     return values
