@@ -31,7 +31,7 @@ class LandmarkRidgeDetector(RidgeDetector):
         contact = dark_lines(colours[0])
         curves, strengths = dict(landmarks), {}
         for once in PASSES:
-            planes = lip_planes(colours, curves, once.band, once.tolerance)
+            planes = lip_planes(colours, curves, once.band, once.tolerance, once.beside)
             curves["outer"], strengths["outer"] = self.moved(
                 curves["outer"], planes["outer"], once.outer_reach * reach, once.step_px
             )

@@ -10,18 +10,26 @@ from vermilion.contours.gums import flesh_plane
 from vermilion.contours.region import SIDE
 
 LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade above it allows
+#: Just beside a border: from where to where colours count as lip's and as skin's (per inter-ocular distance).
+BESIDE = (0.01, 0.04)
+LEAST_SAMPLES = 20  # pixels that tell a colour
 LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
 
 
 def lip_planes(
-    colours: np.ndarray, curves: dict[str, np.ndarray], band: tuple[float, float], tolerance: float
+    colours: np.ndarray,
+    curves: dict[str, np.ndarray],
+    band: tuple[float, float],
+    tolerance: float,
+    beside: bool = False,
 ) -> dict[str, np.ndarray]:
     """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
 
     `outer`: probability of lip against skin, of two normal distributions with one covariance
     (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
     the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
-    What is lip, the `curves` (n, 2) of both contours and the band of the pass say.
+    What is lip, the `curves` (n, 2) of both contours and the band of the pass say; `beside`: for
+    `outer`, what lies just beside its curve, as lips pale towards their border.
     """
     size = colours.shape[1]
     inside, to_outer = drawn(curves["outer"], size)
@@ -30,22 +38,32 @@ def lip_planes(
     lip = inside & ~opening & (ratio > band[0]) & (ratio < band[1])
     scale = size / SIDE
     skin = ~inside & (to_outer > 0.05 * scale) & (to_outer < 0.12 * scale)
-    if lip.sum() < 20 or skin.sum() < 20:
+    if min(lip.sum(), skin.sum()) < LEAST_SAMPLES:
         return {name: np.zeros_like(colours[0]) for name in ("inner", "outer", "flesh")}
-    lips, skins = colours[:, lip].T.astype(np.float64), colours[:, skin].T.astype(np.float64)
-    own = _covariance(lips)
-    shared = 0.5 * (own + _covariance(skins))
-    spread = own + LEAST_SPREAD**2 * np.eye(3)
-    direction = np.linalg.solve(shared, lips.mean(axis=0) - skins.mean(axis=0))
-    middle = 0.5 * (lips.mean(axis=0) + skins.mean(axis=0))
-    log_odds = np.tensordot(direction, colours - middle[:, None, None], axes=1)
+    sides = lip, skin
+    if beside:
+        near = (to_outer > BESIDE[0] * scale) & (to_outer < BESIDE[1] * scale)
+        found = inside & ~opening & near, ~inside & near
+        sides = found if min(side.sum() for side in found) >= LEAST_SAMPLES else sides
+    lips = colours[:, lip].T.astype(np.float64)
     away = colours.reshape(3, -1).T - lips.mean(axis=0)
+    spread = _covariance(lips) + LEAST_SPREAD**2 * np.eye(3)
     squared = np.einsum("nk,kl,nl->n", away, np.linalg.inv(spread), away).reshape(size, size)
     return {
-        "outer": (1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))).astype(np.float32),
+        "outer": _probability(colours, *sides),
         "inner": (1.0 - np.exp(-squared / tolerance)).astype(np.float32),
         "flesh": flesh_plane(colours, lip),
     }
+
+
+def _probability(colours: np.ndarray, lip: np.ndarray, skin: np.ndarray) -> np.ndarray:
+    """Of lip against skin (size, size), where masks (size, size) tell what either looks like."""
+    lips, skins = (colours[:, mask].T.astype(np.float64) for mask in (lip, skin))
+    shared = 0.5 * (_covariance(lips) + _covariance(skins))
+    direction = np.linalg.solve(shared, lips.mean(axis=0) - skins.mean(axis=0))
+    middle = 0.5 * (lips.mean(axis=0) + skins.mean(axis=0))
+    log_odds = np.tensordot(direction, colours - middle[:, None, None], axes=1)
+    return (1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))).astype(np.float32)
 
 
 def dark_lines(lightness: np.ndarray) -> np.ndarray:

@@ -39,6 +39,7 @@ class Pass:
         inner_reach: of the search for the inner border. A whole reach starts where the detector
             does, a part at the border found before.
         step_px: between the places along a normal, region pixels.
+        beside: whether what lies just beside the outer border tells it, which must nearly be known.
     """
 
     band: tuple[float, float]
@@ -46,6 +47,7 @@ class Pass:
     outer_reach: float
     inner_reach: float
     step_px: float
+    beside: bool = False
 
 
 #: First the middle of the lips, as landmarks may miss: those of the outer border by a whole lip, where
@@ -55,7 +57,7 @@ class Pass:
 PASSES = (
     Pass((0.3, 0.7), 18.0, 1.5, 1.0, 0.5),
     Pass((0.5, 0.95), 18.0, 1.0, 1.0, 0.5),
-    Pass((0.5, 0.95), 50.0, 0.3, 0.3, 0.25),
+    Pass((0.5, 0.95), 50.0, 0.3, 0.3, 0.25, beside=True),
 )
 
 

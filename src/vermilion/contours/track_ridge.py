@@ -25,7 +25,7 @@ from vermilion.contours.curves import (
     smoothed_ring,
     uncrossed,
 )
-from vermilion.contours.lip_planes import dark_lines, lip_planes
+from vermilion.contours.lip_planes import BESIDE, dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
 from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
@@ -33,8 +33,6 @@ from vermilion.errors import InputError
 from vermilion.progress import progress
 
 STEP_PX = 0.5
-#: Beside a border, what counts as lip and as skin (per inter-ocular distance).
-BESIDE = (0.01, 0.04)
 #: Deviation along the contour of what is learnt together (share of the ring).
 ALONG = 3 / 80
 LEAST_SPREAD = 0.02  # of a colour about its mean
