@@ -67,7 +67,7 @@ class ContourDetectorConfig(StageConfig):
         "colour moved there (`label_tolerance`), else track.",
     )
     label_tolerance: float = Field(
-        0.006,
+        0.007,
         ge=0,
         le=1,
         description="`auto`: so far from the border of the lips' colour the outer contours of a take's "
