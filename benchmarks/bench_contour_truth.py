@@ -29,7 +29,7 @@ import numpy as np
 import pandas as pd
 
 from vermilion.camera import read_cameras
-from vermilion.config.contours import ContourDetectorConfig, TrackRidgeConfig
+from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.curves import loop_spline
 from vermilion.contours.label_offset import without_lean
 from vermilion.contours.labels import label_paths, read_label
@@ -162,17 +162,17 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     if tracked:
         lips = TrackedLips.of(tracked[0])
         rings = {f: lips.rings_px(mesh, camera) for f, mesh in enumerate(tracked[2])}
-        section = TrackRidgeConfig()
+        cfg = ContourDetectorConfig()
         detectors["track"] = learn_from_take(
             TrackRidgeDetector(),
-            sorted(evenly(np.flatnonzero(track.valid).tolist(), section.frames)),
+            sorted(evenly(np.flatnonzero(track.valid).tolist(), cfg.track.frames)),
             lambda frame: source.read(camera.name, frame),
             track.points_px.__getitem__,
             rings.__getitem__,
-            section.reach,
+            cfg.track.reach,
         )
-        tolerance = ContourDetectorConfig().label_tolerance
-        labelled, _ = without_lean(labelled, detectors["track"], rings.get, tolerance)
+        limits = cfg.label_tolerance, cfg.label_reach
+        labelled, _ = without_lean(labelled, detectors["track"], rings.get, *limits)
     if labelled:
         detectors["boosted"] = train_detector(labelled, TrainingSettings())
     rows = []

@@ -116,7 +116,7 @@ def labelled_frames(data: Path) -> dict[int, LabelledFrame]:
     for number, path in label_paths(capture, "cam").items():
         picture = source.read("cam", number)
         frames[number] = LabelledFrame(
-            picture, landmarks.detect(picture).points_px, read_label(path)
+            picture, landmarks.detect(picture).points_px, read_label(path), number
         )
     return frames
 

@@ -50,6 +50,17 @@ def to(folder) -> dict:
     return {"detector": folder / "detector.npz", "quality": folder / "labels.tsv"}
 
 
+def train(root, params, folder, **changed) -> None:
+    """The detector of the take into a folder; `changed` inputs in place of the take's."""
+    run_script(
+        "contour_detector",
+        wildcards=NAME,
+        params=params,
+        input={**of_take(root), **changed},
+        output=to(folder),
+    )
+
+
 @pytest.fixture(scope="module")
 def take(tmp_path_factory):
     """Five frames of a drawn mouth, three of them labelled, one damaged, and its coarse track."""
@@ -85,9 +96,7 @@ def take(tmp_path_factory):
         "camera": "cam",
         "frames": FRAMES,
     }
-    run_script(
-        "contour_detector", wildcards=NAME, params=params, input=of_take(root), output=to(root)
-    )
+    train(root, params, root)
     run_stages(root, params, "000000-000004", FRAMES)
     return root, params
 
@@ -208,9 +217,8 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
 
     root, params = take
     track = of_take(root)
-    job = {"wildcards": NAME, "output": to(tmp_path)}
     bare = {**params, "capture": str(tmp_path)}
-    run_script("contour_detector", params=bare, input=track, **job)
+    train(root, bare, tmp_path)
     assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
     run_script(
         "contours",
@@ -228,11 +236,11 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
     on_line = outer[tuple(np.floor(line[5:55, ::-1]).astype(int).T)]
     assert on_line.mean() > 0.5 * outer.max()
     plain = {"cfg": {"contours.detector": {"kind": "landmarks"}}}
-    run_script("contour_detector", params={**bare, **plain}, input=track, **job)
+    train(root, {**bare, **plain}, tmp_path)
     assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)
     demanding = {**bare, "cfg": {"contours.detector": {"kind": "boosted"}}}
     with pytest.raises(InputError, match="no usable contour labels"):
-        run_script("contour_detector", params=demanding, input=track, **job)
+        train(root, demanding, tmp_path)
 
 
 def test_labels_of_which_none_serves_leave_the_track(take, tmp_path):
@@ -243,13 +251,7 @@ def test_labels_of_which_none_serves_leave_the_track(take, tmp_path):
     lost = LandmarkTrack.load(root / "landmarks.npz")
     valid = ~np.isin(lost.frames, LABELLED)
     LandmarkTrack(lost.frames, lost.points_px, lost.confidence, valid).save(tmp_path / "lost.npz")
-    run_script(
-        "contour_detector",
-        wildcards=NAME,
-        params=params,
-        input={**of_take(root), "landmarks": [tmp_path / "lost.npz"]},
-        output=to(tmp_path),
-    )
+    train(root, params, tmp_path, landmarks=[tmp_path / "lost.npz"])
     assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
     said = read_table(tmp_path / "labels.tsv")
     assert said["frame"].tolist() == list(LABELLED)
@@ -262,21 +264,17 @@ def test_labels_beside_the_border_are_moved_and_flagged_and_a_damaged_frame_left
     root, params = take
     capture = tmp_path / "capture"
     shutil.copytree(root / "capture", capture)
-    for path in (capture / "labels/contours/cam").iterdir():
+    labels = capture / "labels/contours/cam"
+    for path in labels.iterdir():
         drawn = json.loads(path.read_text())
         points = np.array(drawn["outer"]["points"])
         middle = points.mean(axis=0)
         drawn["outer"]["points"] = (middle + 0.9 * (points - middle)).tolist()
         path.write_text(json.dumps(drawn))
+    (labels / "000900.json").write_text("of another take, and no label at all")
     picture = capture / "frames/cam/000002.png"
     picture.write_bytes(picture.read_bytes()[:500])
-    run_script(
-        "contour_detector",
-        wildcards=NAME,
-        params={**params, "capture": str(capture), "source": str(capture)},
-        input=of_take(root),
-        output=to(tmp_path),
-    )
+    train(root, {**params, "capture": str(capture), "source": str(capture)}, tmp_path)
     said = read_table(tmp_path / "labels.tsv")
     assert said["frame"].tolist() == [0, 1, 2]
     assert said["reason"][:2].str.contains("inside the border of the lips' colour: moved").all()
@@ -293,11 +291,5 @@ def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_p
         path = tmp_path / f"frames/cam/{frame:06d}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"no picture")
-    run_script(
-        "contour_detector",
-        wildcards=NAME,
-        params={**params, "capture": str(tmp_path), "source": str(tmp_path)},
-        input=of_take(root),
-        output=to(tmp_path),
-    )
+    train(root, {**params, "capture": str(tmp_path), "source": str(tmp_path)}, tmp_path)
     assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)

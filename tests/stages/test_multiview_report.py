@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from tests import lip_patch
+from tests.stages.multiview_jobs import CFG, PLACE, inputs, make_capture, reconstruct
 from tests.stages.run_script import run_script
-from tests.stages.test_multiview import CFG, PLACE, inputs, make_capture, reconstruct
 from vermilion.tables import read_table
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
-from tests.stages.test_multiview import POSES, make_capture, reconstruct, surface_error_mm
+from tests.stages.multiview_jobs import POSES, make_capture, reconstruct, surface_error_mm
 from vermilion.camera import look_at, pinhole
 from vermilion.images import linear_to_srgb, write_image
 from vermilion.sequences import read_sequence

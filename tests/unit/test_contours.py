@@ -32,7 +32,7 @@ SMALL = TrainingSettings(
 @pytest.fixture(scope="module")
 def detector():
     frames = [
-        LabelledFrame(*draw_mouth(opening, height, seed=seed))
+        LabelledFrame(*draw_mouth(opening, height, seed=seed), seed)
         for seed, (opening, height) in enumerate(((2.0, 20.0), (12.0, 28.0), (7.0, 24.0)))
     ]
     return train_detector(frames, SMALL)
@@ -89,7 +89,7 @@ def test_saved_detector_answers_the_same(detector, tmp_path):
 
 
 def test_training_is_repeatable(detector, tmp_path):
-    frames = [LabelledFrame(*draw_mouth(6.0, 24.0, seed=1))]
+    frames = [LabelledFrame(*draw_mouth(6.0, 24.0, seed=1), 1)]
     small = TrainingSettings(
         n_features=100, variants=2, max_samples=2000, boosting=BoostingSettings(n_trees=8)
     )

@@ -9,13 +9,13 @@ import pytest
 
 from tests.unit.mouths import draw_mouth
 from tests.unit.test_track_ridge import learnt, rings
-from vermilion.contours.label_offset import FARTHEST, moved_inwards, outer_offset, without_lean
+from vermilion.contours.label_offset import moved_inwards, outer_offset, without_lean
 from vermilion.contours.labels import ContourLabel
 from vermilion.contours.training import LabelledFrame
 from vermilion.evaluation.contour_error import distance_to_polyline
 
 SHAPES = [(2.0, 20.0), (12.0, 28.0), (7.0, 24.0)]
-INTEROCULAR_PX, TOLERANCE = 200.0, 0.007
+INTEROCULAR_PX, TOLERANCE, REACH = 200.0, 0.007, 0.025
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_it_is_the_same_in_a_picture_twice_as_large(detector):
 @pytest.mark.parametrize("lean_px", [-3.0, 3.0])
 def test_labels_that_lean_are_moved_to_the_border(detector, lean_px):
     drawn = labelled(lean_px)
-    moved, rows = without_lean(drawn, detector, tracked, TOLERANCE)
+    moved, rows = without_lean(drawn, detector, tracked, TOLERANCE, REACH)
     for before, after in zip(drawn, moved, strict=True):
         assert distance_px(before) == pytest.approx(3.0, abs=0.3)
         assert distance_px(after) < 0.6
@@ -71,7 +71,7 @@ def test_labels_that_lean_are_moved_to_the_border(detector, lean_px):
 
 def test_exact_labels_count_as_drawn(detector):
     drawn = labelled(0.0)
-    kept, rows = without_lean(drawn, detector, tracked, TOLERANCE)
+    kept, rows = without_lean(drawn, detector, tracked, TOLERANCE, REACH)
     assert kept == drawn
     assert [row.reason for row in rows] == ["", "", ""]
     assert max(abs(row.figures["outer_offset"]) for row in rows) < TOLERANCE / 2
@@ -80,23 +80,25 @@ def test_exact_labels_count_as_drawn(detector):
 def test_what_labels_say_of_a_single_frame_stays(detector):
     drawn = labelled(-3.0)
     drawn[1] = moved_inwards(drawn[1], 1.0 / INTEROCULAR_PX)
-    moved, _ = without_lean(drawn, detector, tracked, TOLERANCE)
+    moved, _ = without_lean(drawn, detector, tracked, TOLERANCE, REACH)
     assert distance_px(moved[1]) == pytest.approx(1.0, abs=0.4)
 
 
 def test_labels_of_something_else_are_not_moved_but_named(detector):
-    drawn = labelled(-2.0 * FARTHEST * INTEROCULAR_PX)
-    kept, rows = without_lean(drawn, detector, tracked, TOLERANCE)
+    drawn = labelled(-2.0 * REACH * INTEROCULAR_PX)
+    kept, rows = without_lean(drawn, detector, tracked, TOLERANCE, REACH)
     assert kept == drawn
     assert all("check labels" in row.reason for row in rows)
 
 
 def test_a_frame_without_a_track_follows_the_others(detector):
     drawn = labelled(-3.0)
-    moved, rows = without_lean(drawn, detector, lambda n: tracked(n) if n else None, TOLERANCE)
+    moved, rows = without_lean(
+        drawn, detector, lambda n: tracked(n) if n else None, TOLERANCE, REACH
+    )
     assert distance_px(moved[0]) < 0.6
     assert np.isnan(rows[0].figures["outer_offset"])
-    kept, rows = without_lean(drawn, detector, lambda n: None, TOLERANCE)
+    kept, rows = without_lean(drawn, detector, lambda n: None, TOLERANCE, REACH)
     assert kept == drawn
     assert [row.reason for row in rows] == ["", "", ""]
 

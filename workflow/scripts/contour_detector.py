@@ -80,7 +80,8 @@ def main(snakemake) -> None:
         rings = TrackedRings(snakemake.input, track)
         by_track = from_track(cfg, camera, source, track, rings)
     if labelled and by_track:
-        labelled, said = without_lean(labelled, by_track, rings, cfg.label_tolerance)
+        limits = cfg.label_tolerance, cfg.label_reach
+        labelled, said = without_lean(labelled, by_track, rings, *limits)
         rows += said
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)

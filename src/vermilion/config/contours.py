@@ -73,6 +73,13 @@ class ContourDetectorConfig(StageConfig):
         description="`auto`: so far from the border of the lips' colour the outer contours of a take's "
         "labels may lie, on the mean, and count as drawn (per inter-ocular distance); 1 takes all so.",
     )
+    label_reach: float = Field(
+        0.025,
+        gt=0,
+        le=1,
+        description="`auto`: labels that lie farther from there are named and not moved, as they or the track "
+        "are those of something else (per inter-ocular distance).",
+    )
     interocular_size_px: float = Field(
         200.0,
         ge=60,

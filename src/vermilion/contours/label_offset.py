@@ -21,10 +21,6 @@ from vermilion.contours.training import LabelledFrame
 from vermilion.landmarks.scheme import interocular_px
 from vermilion.quality import QualityRow
 
-#: Farther from the colour's border than this, per inter-ocular distance, labels do not lean: the
-#: labels or the track are those of something else, and which of them nobody can tell.
-FARTHEST = 0.025
-
 
 def outer_offset(
     frame: LabelledFrame, detector: TrackRidgeDetector, lips_px: tuple[np.ndarray, np.ndarray]
@@ -59,17 +55,19 @@ def without_lean(
     detector: TrackRidgeDetector,
     lips_px: Callable[[int], tuple[np.ndarray, np.ndarray] | None],
     tolerance: float,
+    reach: float,
 ) -> tuple[list[LabelledFrame], list[QualityRow]]:
     """Labels on the border that the pictures show, and what is to be said of each.
 
     Where the median over the frames of `outer_offset` exceeds the tolerance, all outer contours are
-    moved by it: what they say of each frame and each place stays.
+    moved by it: what they say of each frame and each place stays. Beyond the reach they are not: the
+    labels or the track are those of something else, and which of them nobody can tell.
 
     Args:
         frames: of one take.
         detector: the take's.
         lips_px: frame number -> rings (n, 2) of its tracked lips; None where it is not tracked.
-        tolerance: per inter-ocular distance.
+        tolerance, reach: per inter-ocular distance.
     """
     rings = [lips_px(frame.number) for frame in frames]
     offsets = [
@@ -77,15 +75,19 @@ def without_lean(
         for frame, ring in zip(frames, rings, strict=True)
     ]
     lean = float(np.nanmedian(offsets)) if np.isfinite(offsets).any() else 0.0
-    said = ""
-    if abs(lean) > tolerance:
-        side = "outside" if lean > 0 else "inside"
-        said = f"labels lie {abs(lean):.4f} inter-ocular distances {side} the border of the lips' colour"
-        said += ": moved there" if abs(lean) <= FARTHEST else ", too far to be a lean: check labels"
+    side = "outside" if lean > 0 else "inside"
+    where = (
+        f"labels lie {abs(lean):.4f} inter-ocular distances {side} the border of the lips' colour"
+    )
+    moved = tolerance < abs(lean) <= reach
+    if moved:
+        said = f"{where}: moved there"
+    elif abs(lean) > reach:
+        said = f"{where}, too far to be a lean: check labels"
+    else:
+        said = ""
     rows = [
         QualityRow(frame.number, reason=said, figures={"outer_offset": offset})
         for frame, offset in zip(frames, offsets, strict=True)
     ]
-    if tolerance < abs(lean) <= FARTHEST:
-        frames = [moved_inwards(frame, lean) for frame in frames]
-    return list(frames), rows
+    return [moved_inwards(frame, lean) if moved else frame for frame in frames], rows

@@ -101,7 +101,7 @@ class LabelledFrame:
     linear_rgb: np.ndarray
     landmarks_px: np.ndarray
     label: ContourLabel
-    number: int = 0
+    number: int
 
 
 def read_labelled(
@@ -112,7 +112,7 @@ def read_labelled(
     required: bool,
     **place,
 ) -> tuple[list[LabelledFrame], list[QualityRow]]:
-    """The labelled frames of a take's monocular camera whose landmarks were found, and the others.
+    """The labelled frames of a take's monocular camera that serve, and why others of the take do not.
 
     Args:
         capture: the capture folder, with `labels/contours/<camera>/`.
@@ -124,13 +124,13 @@ def read_labelled(
     """
     labelled, left_out = [], []
     for frame, path in label_paths(capture, camera).items():
-        drawn = read_label(path, camera=camera, frame=frame, **place)
-        index = np.flatnonzero((landmarks.frames == frame) & landmarks.valid)
-        if len(index) == 0:
-            left_out.append(
-                QualityRow(frame, reason="label left out: not in the take, or no landmarks")
-            )
+        index = np.flatnonzero(landmarks.frames == frame)
+        if len(index) == 0:  # of another take of the capture
             continue
+        if not landmarks.valid[index[0]]:
+            left_out.append(QualityRow(frame, reason="label left out: no landmarks"))
+            continue
+        drawn = read_label(path, camera=camera, frame=frame, **place)
         try:
             picture = source.read(camera, frame)
         except InputError as error:
