@@ -32,10 +32,10 @@ run: $(READY)
 
 report: $(READY)
 	@$(BIN)/snakemake --configfile $(CONFIG) --report "$(RESULTS)/report.html" >/dev/null 2>"$(RESULTS)/logs/report.log" || { cat "$(RESULTS)/logs/report.log"; exit 1; }
-	@$(BIN)/python -m vermilion.workflow.results "$(RESULTS)"
+	@$(BIN)/python -m vermilion.app.results "$(RESULTS)"
 
 verify: $(READY)
-	@$(BIN)/python -m vermilion.workflow.checksums "$(RESULTS)"
+	@$(BIN)/python -m vermilion.provenance.checksums "$(RESULTS)"
 
 test: test-quick
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m slow

@@ -24,10 +24,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
-from vermilion.camera import read_cameras  # noqa: E402
 from vermilion.config.multiview import ImageConfig, TrackConfig  # noqa: E402
 from vermilion.faces.model import FaceModel  # noqa: E402
-from vermilion.frames import open_frames  # noqa: E402
+from vermilion.geometry.camera import read_cameras  # noqa: E402
+from vermilion.imaging.frames import open_frames  # noqa: E402
 from vermilion.multiview.anchors import TrackSettings, find_anchor  # noqa: E402
 from vermilion.multiview.files import read_neutral  # noqa: E402
 from vermilion.multiview.photometric import FlowMatcher  # noqa: E402

@@ -28,7 +28,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.camera import read_cameras
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.curves import loop_spline
 from vermilion.contours.label_offset import without_lean
@@ -42,10 +41,11 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
 from vermilion.features.search import SearchSettings, find_inner, find_outer
 from vermilion.features.tracked_lips import TrackedLips
-from vermilion.frames import open_frames
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER, interocular_px
-from vermilion.sequences import read_sequence
+from vermilion.storage.sequences import read_sequence
 from vermilion.studio.labels import contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake

@@ -34,7 +34,7 @@ from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
 from vermilion.features.search import SearchSettings, find_inner, find_outer
-from vermilion.frames import open_frames
+from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.networks import NetworkDetector
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER, interocular_px
 

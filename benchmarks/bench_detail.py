@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from tests.unit import test_corrective_flow as scenes
-from vermilion.corrective_flow.flow import FlowSettings, corrective_flow
+from vermilion.detail.flow.six_frame_flow import FlowSettings, corrective_flow
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from tests import lip_patch
-from vermilion.draw import to_display
+from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.paint import Paint, paint_frame

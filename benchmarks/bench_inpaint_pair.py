@@ -35,22 +35,22 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from vermilion.camera import Camera, read_cameras, write_cameras
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.studio import StudioConfig, StudioTake
-from vermilion.draw import label, to_display
-from vermilion.evaluation.alignment import align_frames, moved
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.faces.model import FaceModel
-from vermilion.images import read_image
+from vermilion.geometry.camera import Camera, read_cameras, write_cameras
+from vermilion.geometry.frame_alignment import align_frames, moved
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.draw import label, to_display
+from vermilion.imaging.images import read_image
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.grain import seed_of
 from vermilion.inpaint.opening import Evidence
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading
-from vermilion.raycast import RayCaster
-from vermilion.sequences import read_sequence
+from vermilion.storage.sequences import read_sequence
 from vermilion.studio.capture_writer import picture_path, write_pictures
 from vermilion.studio.take import StudioTakePlan, plan_of
 

@@ -32,9 +32,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera, read_cameras
 from vermilion.faces.model import FaceModel
-from vermilion.frames import open_frames
+from vermilion.geometry.camera import Camera, read_cameras
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.frames import open_frames
+from vermilion.landmarks.correct_key_frames import settle
 from vermilion.landmarks.correction import CorrectionSettings, correct
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
@@ -49,12 +51,10 @@ from vermilion.landmarks.scheme import (
     NOSE,
     interocular_px,
 )
-from vermilion.landmarks.settle import settle
-from vermilion.raycast import RayCaster
-from vermilion.tracking.expression import fit_motion
-from vermilion.tracking.observation import Observations, focal_px
+from vermilion.tracking.landmark_fit.expression import fit_motion
+from vermilion.tracking.landmark_fit.observation import Observations, focal_px
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.shape import LandmarkShape
 
 GROUPS = {
     "all": np.arange(N_LANDMARKS),

@@ -25,11 +25,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vermilion.camera import read_cameras
 from vermilion.config.multiview import MultiviewConfig
-from vermilion.evaluation.closest import Surface
 from vermilion.faces.model import FaceModel
-from vermilion.frames import open_frames
+from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.closest_points import Surface
+from vermilion.imaging.frames import open_frames
 from vermilion.multiview.files import read_neutral, read_track
 from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher

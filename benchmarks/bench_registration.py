@@ -25,12 +25,12 @@ import trimesh
 from scipy.spatial import cKDTree
 from trimesh.registration import nricp_amberg
 
-from vermilion.camera import read_cameras
 from vermilion.config.multiview import ImageConfig, MultiviewConfig
-from vermilion.evaluation.closest import Surface
 from vermilion.faces.model import FaceModel
-from vermilion.frames import open_frames
-from vermilion.mesh import Mesh, triangle_normals
+from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.mesh import Mesh, triangle_normals
+from vermilion.imaging.frames import open_frames
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.files import read_neutral, read_views
 from vermilion.multiview.neutral import StereoSettings, stereo_cloud

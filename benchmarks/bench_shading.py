@@ -17,10 +17,11 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from tests.unit import test_shading_refinement as scenes
-from vermilion.mesh import triangle_normals, vertex_normals
-from vermilion.shading_refinement import combine as combination
-from vermilion.shading_refinement import detail, relief
-from vermilion.shading_refinement.sight import Sight
+from vermilion.detail.relief import combine as combination
+from vermilion.detail.relief import relief
+from vermilion.detail.relief import short_range as detail
+from vermilion.detail.relief.sight import Sight
+from vermilion.geometry.mesh import triangle_normals, vertex_normals
 
 SIDE = 161
 

@@ -17,7 +17,7 @@ import time
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.raycast import RayCaster
+from vermilion.geometry.raycast import RayCaster
 from vermilion.studio.lighting import LIGHTINGS
 from vermilion.studio.look import look_of
 from vermilion.studio.render import Stage, render

@@ -24,23 +24,23 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.camera import Camera
+from vermilion.appearance.estimate import Appearance
 from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
-from vermilion.evaluation.closest import Surface
 from vermilion.faces.model import FaceModel
-from vermilion.frames import open_frames
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.mesh import rigid_alignment, vertex_normals
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.mesh import rigid_alignment, vertex_normals
-from vermilion.photometric.appearance import Appearance
-from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.photometric.layer import CorrectiveLayer, LayerSettings
-from vermilion.photometric.take import TakeStart
-from vermilion.raycast import RayCaster
-from vermilion.sequences import read_sequence
-from vermilion.tables import read_table
-from vermilion.tracking.expression import fit_motion
-from vermilion.tracking.observation import focal_px
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import read_table
+from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.landmark_fit.expression import fit_motion
+from vermilion.tracking.landmark_fit.observation import focal_px
+from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import fit_settings
 

@@ -11,13 +11,13 @@ from functools import cache
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera, look_at, pinhole
-from vermilion.draw import to_display
 from vermilion.faces.model import REGIONS, FaceModel
-from vermilion.images import srgb_to_linear
+from vermilion.geometry.camera import Camera, look_at, pinhole
+from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.draw import to_display
+from vermilion.imaging.images import srgb_to_linear
 from vermilion.inpaint.fields import sample
-from vermilion.mesh import normalised, vertex_normals
-from vermilion.raycast import RayCaster
 
 #: Opening (mm) and pucker of a few mouths.
 POSES = {"rest": (0.0, 0.0), "open": (7.0, 0.1), "pucker": (1.0, 1.0)}

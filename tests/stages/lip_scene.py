@@ -15,13 +15,13 @@ from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from tests.heads import small_studio, small_tracker
-from vermilion.camera import look_at, pinhole
 from vermilion.faces.model import FaceModel
-from vermilion.images import write_srgb8
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.mesh import submesh
+from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.mesh import submesh
-from vermilion.quality import QualityRow, write_quality
-from vermilion.sequences import write_sequence
+from vermilion.storage.quality import QualityRow, write_quality
+from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
 
 N_FRAMES, CHUNK = 40, 20

@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 
 from tests import lip_patch
 from tests.stages.run_script import run_script
-from vermilion.camera import write_cameras
 from vermilion.config.multiview import MultiviewConfig
-from vermilion.images import write_image
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.camera import write_cameras
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.imaging.images import write_image
 
 POSES = [(0.0, 0.0), (0.7, 0.02), (1.5, 0.05), (2.2, 0.1)]
 LOST = {(2, "left")}  # a frame that a camera misses
@@ -81,7 +81,7 @@ def inputs(root):
 
 def neutral(root):
     run_script(
-        "multiview_neutral",
+        "multiview/multiview_neutral",
         wildcards=PLACE,
         params={"cfg": CFG, "source": str(root / "rom"), "frame": 0, "first": {}},
         input=inputs(root),
@@ -105,7 +105,7 @@ def anchors(root, windows, source="rom"):
     for index, window in enumerate(windows, start=1):
         paths.append(root / f"anchors/{source}/{index:04d}.npz")
         run_script(
-            "multiview_anchor",
+            "multiview/multiview_anchor",
             wildcards={**PLACE, "clip": f"{index:04d}"},
             params={"cfg": CFG, "source": str(root / source), "neutral": 0, "window": window},
             input=inputs(root),
@@ -117,7 +117,7 @@ def anchors(root, windows, source="rom"):
 def clip(root, index, anchors, source="rom"):
     path = root / f"clips/{source}/{len(anchors)}/{index:04d}.npz"
     run_script(
-        "multiview_clip",
+        "multiview/multiview_clip",
         wildcards={**PLACE, "clip": f"{index:04d}"},
         params={"cfg": CFG, "source": str(root / source), "frames": [0, 3]},
         input={**inputs(root), "anchors": anchors},
@@ -128,7 +128,7 @@ def clip(root, index, anchors, source="rom"):
 
 def join(root, clips, anchors, name="track"):
     run_script(
-        "multiview_track",
+        "multiview/multiview_track",
         wildcards=PLACE,
         params={},
         input={**inputs(root), "clips": clips, "anchors": anchors},
@@ -138,7 +138,7 @@ def join(root, clips, anchors, name="track"):
 
 def refine(root, frames, chunk, source="rom"):
     run_script(
-        "multiview_refine",
+        "multiview/multiview_refine",
         wildcards={**PLACE, "chunk": chunk},
         params={"cfg": CFG, "source": str(root / source), "neutral": 0, "frames": frames},
         input=inputs(root),

@@ -8,9 +8,9 @@ import numpy as np
 
 from tests.stages.run_script import run_script
 from tests.unit.test_calibrate import BOARD, SIZE, board_poses, make_rig, render
-from vermilion.camera import read_cameras
-from vermilion.images import write_srgb8
-from vermilion.tables import read_table
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.tables import read_table
 
 FRAMES = [0, 1, 2]
 
@@ -31,7 +31,7 @@ def write_capture(folder) -> dict:
 def check(source, out, frames=FRAMES):
     chunk = f"{frames[0]:06d}-{frames[-1]:06d}"
     run_script(
-        "capture_manifest",
+        "capture/capture",
         wildcards={"subject": "s1", "take": "t1", "chunk": chunk},
         params={
             "cfg": {"capture.manifest": {"hash_decoded": False}},
@@ -59,7 +59,7 @@ def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
     assert list(rows["valid"]) == [1, 0] and "mid: unreadable" in rows["reason"][1]
     assert json.loads(manifests[1].read_text())["bad"] == {}
     run_script(
-        "cameras",
+        "capture/cameras",
         wildcards={"subject": "s1", "take": "t1"},
         params={
             "cfg": {

@@ -12,10 +12,10 @@ from tests.stages.run_script import run_script
 from tests.unit.mouths import draw_mouth, facing_camera, mouth_model
 from vermilion.contours.maps import read_maps
 from vermilion.features.vector import FeatureTable
-from vermilion.images import write_image
+from vermilion.imaging.images import write_image
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.sequences import write_sequence
-from vermilion.tables import read_table
+from vermilion.storage.sequences import write_sequence
+from vermilion.storage.tables import read_table
 
 SHAPES = [(2.0, 20.0), (12.0, 28.0), (7.0, 24.0), (9.0, 26.0), (5.0, 22.0)]  # opening, height
 LABELLED = (0, 1, 2)
@@ -53,7 +53,7 @@ def to(folder) -> dict:
 def train(root, params, folder, **changed) -> None:
     """The detector of the take into a folder; `changed` inputs in place of the take's."""
     run_script(
-        "contour_detector",
+        "contours/contour_detector",
         wildcards=NAME,
         params=params,
         input={**of_take(root), **changed},
@@ -102,7 +102,7 @@ def take(tmp_path_factory):
 
 
 def _write_track(root, n) -> None:
-    from vermilion.tracking.expression import HeadMotion
+    from vermilion.tracking.landmark_fit.expression import HeadMotion
     from vermilion.tracking.result import Identity, TrackedTake
 
     model, camera = mouth_model(8.0, 24.0), facing_camera()
@@ -136,7 +136,7 @@ def run_stages(root, params, chunk, frames) -> None:
     coarse = np.tile(mouth_model(8.0, 24.0).neutral_mm, (len(frames), 1, 1))
     write_sequence(root / chunk / "C.npy", coarse)
     run_script(
-        "contours",
+        "contours/contours",
         wildcards=NAME,
         params=params,
         input={
@@ -150,7 +150,7 @@ def run_stages(root, params, chunk, frames) -> None:
         },
     )
     run_script(
-        "features",
+        "features/features",
         wildcards=NAME,
         params={**params, "frames": frames},
         input={
@@ -213,7 +213,7 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
     from vermilion.contours.detector import load_detector
     from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
     from vermilion.contours.track_ridge import TrackRidgeDetector
-    from vermilion.errors import InputError
+    from vermilion.storage.errors import InputError
 
     root, params = take
     track = of_take(root)
@@ -221,7 +221,7 @@ def test_without_labels_auto_follows_the_track_and_boosted_says_what_is_missing(
     train(root, bare, tmp_path)
     assert isinstance(load_detector(tmp_path / "detector.npz"), TrackRidgeDetector)
     run_script(
-        "contours",
+        "contours/contours",
         wildcards=NAME,
         params=bare,
         input={**track, "landmarks": track["landmarks"][0], "detector": tmp_path / "detector.npz"},

@@ -11,13 +11,13 @@ from vermilion.config.correction import LayersConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.config.database import DatabaseConfig
 from vermilion.config.training import TrainingConfig
-from vermilion.correction.apply import correct_sequence, correct_with_layers
+from vermilion.correction.correct import correct_sequence, correct_with_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.database.read import LipDatabase
-from vermilion.mesh import rigid_alignment, vertex_areas
+from vermilion.geometry.mesh import rigid_alignment, vertex_areas
 from vermilion.regression.model import load_model
-from vermilion.sequences import read_sequence
-from vermilion.tables import read_table
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import read_table
 from vermilion.tracking.result import Identity, TrackedTake
 
 pytestmark = pytest.mark.slow
@@ -47,7 +47,7 @@ def scene(tmp_path_factory):
 def run_correspondence(root, subject):
     take = root / f"takes/{subject}/rom"
     run_script(
-        "correspondence",
+        "correspondence/correspondence",
         wildcards={"subject": subject},
         params={"cfg": {"correspondence": CorrespondenceConfig().model_dump()}, "take": "rom"},
         input={
@@ -71,7 +71,7 @@ def run_layers(root, subject, chunk):
     take = root / f"takes/{subject}/rom"
     first, last = (int(n) for n in chunk.split("-"))
     run_script(
-        "layers",
+        "correction/layers",
         wildcards={"subject": subject, "take": "rom", "chunk": chunk},
         params={
             "cfg": {"correction.layers": LayersConfig().model_dump()},
@@ -97,7 +97,7 @@ def run_layers(root, subject, chunk):
 def run_neutral_pair(root, subject):
     person, take = root / f"subjects/{subject}", root / f"takes/{subject}/rom"
     run_script(
-        "neutral_pair",
+        "correction/neutral_pair",
         wildcards={"subject": subject, "take": "rom"},
         params={"cfg": {"correction.layers": LayersConfig().model_dump()}, "frame": 0},
         input={
@@ -120,7 +120,7 @@ def run_neutral_pair(root, subject):
 def run_database(root):
     chunk_files = [root / f"takes/{s}/rom/correction" for s in SUBJECTS]
     run_script(
-        "database",
+        "database/database",
         params={
             "cfg": {"database": DatabaseConfig().model_dump()},
             "subjects": list(SUBJECTS),
@@ -149,7 +149,7 @@ def run_database(root):
 
 def run_train(root, regressor):
     run_script(
-        "train",
+        "training/train",
         wildcards={"regressor": regressor},
         params={"cfg": {"training": TrainingConfig().model_dump()}},
         input={"database": root / "database/lips.h5"},

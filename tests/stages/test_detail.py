@@ -4,14 +4,14 @@ import cv2
 import numpy as np
 
 from tests.stages.run_script import run_script
-from vermilion.camera import look_at, pinhole
 from vermilion.config.detail import DetailConfig
 from vermilion.faces.model import REGIONS, FaceModel
-from vermilion.images import read_image, write_image
-from vermilion.raycast import RayCaster, interpolate
-from vermilion.sequences import read_sequence, write_sequence
-from vermilion.tables import read_table
-from vermilion.tracking.expression import HeadMotion
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.imaging.images import read_image, write_image
+from vermilion.storage.sequences import read_sequence, write_sequence
+from vermilion.storage.tables import read_table
+from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.result import TrackedTake
 
 N_FRAMES = 4
@@ -104,7 +104,7 @@ def run_stage(root, paths):
     for path in paths:
         first, last = (int(n) for n in path.stem.split("-"))
         run_script(
-            "detail_flow",
+            "detail/detail_flow",
             wildcards={"subject": "s", "take": "t", "chunk": path.stem},
             params={
                 "cfg": cfg, "source": str(root), "frames": list(range(first, last + 1)),

@@ -7,11 +7,11 @@ import pytest
 
 from tests import lip_patch
 from tests.stages.run_script import run_script
-from vermilion.camera import write_cameras
-from vermilion.draw import to_display
-from vermilion.images import read_image, write_image
-from vermilion.sequences import write_sequence
-from vermilion.tables import read_table
+from vermilion.geometry.camera import write_cameras
+from vermilion.imaging.draw import to_display
+from vermilion.imaging.images import read_image, write_image
+from vermilion.storage.sequences import write_sequence
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -43,14 +43,14 @@ def capture(tmp_path_factory):
                 picture = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=True)
                 write_image(root / f"rom/frames/{name}/{frame:06d}.png", picture)
     run_script(
-        "inpaint_plain",
+        "inpaint/plain_texture",
         wildcards={"subject": "s1"},
         params={"cfg": CFG, "take": "plain", "neutral": 0, "source": str(root / "plain")},
         input={n: root / f for n, f in shared().items() if n != "plain"},
         output={"texture": root / "plain.exr", "overlay": root / "plain.png"},
     )
     run_script(
-        "inpaint_reference",
+        "inpaint/inpaint_reference",
         wildcards={"subject": "s1", "take": "rom"},
         params={"cfg": CFG, "neutral": 0, "source": str(root / "rom")},
         input={n: root / f for n, f in shared().items()},
@@ -74,7 +74,7 @@ def paint(root, out, frames, meshes=None, source="rom"):
         meshes = np.stack([lip_patch.vertices_at(*POSES[frame]) for frame in frames])
     write_sequence(out / f"H/{chunk}.npy", meshes)
     run_script(
-        "inpaint_frames",
+        "inpaint/inpaint",
         wildcards={"subject": "s1", "take": "rom", "chunk": chunk},
         params={"cfg": CFG, "frames": frames, "source": str(root / source)},
         input={

@@ -7,13 +7,13 @@ import pytest
 
 from tests.stages.run_script import run_script
 from tests.unit.test_landmark_descent import drawn_face
-from vermilion.camera import pinhole, write_cameras
 from vermilion.config.landmarks import LandmarksConfig
-from vermilion.images import read_image, write_image
+from vermilion.geometry.camera import pinhole, write_cameras
+from vermilion.imaging.images import read_image, write_image
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import face_size_px
 from vermilion.landmarks.views import LandmarkViews
-from vermilion.tables import read_table
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 N_LABELLED, N_FRAMES = 20, 4
@@ -45,7 +45,7 @@ def stage(tmp_path_factory):
     damaged.write_bytes(damaged.read_bytes()[:400])
     training = section()["training"] | {"stages": 3, "perturbations": 3}
     run_script(
-        "landmark_model",
+        "landmarks/landmark_model",
         params={
             "cfg": {"landmarks.training": training},
             "takes": [{"subject": "a", "take": "b", "source": str(root / "people")}],
@@ -66,7 +66,7 @@ def parameters(root, detector="trained", **csv):
 
 def find(root, frames, params, **inputs):
     run_script(
-        "landmarks",
+        "landmarks/landmarks",
         wildcards={"subject": "a", "take": "t"},
         params=params | {"camera": "cam", "frames": frames},
         input=inputs,
@@ -116,7 +116,7 @@ def test_views_hold_the_cameras_that_see_a_face(stage):
     cameras = {name: pinhole(name, 400.0, 180, 150) for name in ("cam", "empty")}
     write_cameras(root / "cameras", cameras)
     run_script(
-        "landmarks_views",
+        "landmarks/landmarks_views",
         wildcards={"subject": "a", "take": "t"},
         params=parameters(root) | {"frame": 0, "csv": ""},
         input={"cameras": root / "cameras"},
@@ -158,7 +158,7 @@ def correction_settings():
 def key_frames_of(root, **inputs):
     """Run the stage; the table of key frames."""
     run_script(
-        "landmarks_key_frames",
+        "landmarks/landmarks_key_frames",
         wildcards={"subject": "a", "take": "t"},
         params={
             "cfg": {"landmarks.key_frames": section()["key_frames"]} | correction_settings(),
@@ -173,7 +173,7 @@ def key_frames_of(root, **inputs):
 
 def corrected_of(root, frames):
     run_script(
-        "landmarks_corrected",
+        "landmarks/landmarks_corrected",
         wildcards={"subject": "a", "take": "t"},
         params={
             "cfg": correction_settings(),

@@ -24,10 +24,10 @@ from tests.stages.multiview_jobs import (
     surface_error_mm,
 )
 from tests.stages.run_script import run_script
-from vermilion.camera import write_cameras
-from vermilion.images import image_size
-from vermilion.sequences import read_mesh, read_sequence
-from vermilion.tables import read_table
+from vermilion.geometry.camera import write_cameras
+from vermilion.imaging.images import image_size
+from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -167,7 +167,7 @@ def test_the_neutral_frame_is_the_neutral(take):
 def later_neutral(take, root, rig, first):
     """The neutral of a later take in `root`; `first` as the rule's parameter says it."""
     run_script(
-        "multiview_neutral",
+        "multiview/multiview_neutral",
         wildcards={**PLACE, "take": "rom2"},
         params={"cfg": CFG, "source": str(root / "rom"), "frame": 0, "first": first},
         input={

@@ -13,7 +13,7 @@ import pytest
 from tests import lip_patch
 from tests.stages.multiview_jobs import CFG, PLACE, inputs, make_capture, reconstruct
 from tests.stages.run_script import run_script
-from vermilion.tables import read_table
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def drift(root, chunk):
     meshes = np.load(root / f"H/{WHOLE}.npy")[first : last + 1]
     np.save(root / f"{chunk}.npy", meshes)
     run_script(
-        "multiview_drift",
+        "multiview/multiview_drift",
         wildcards={**PLACE, "chunk": chunk},
         params={
             "cfg": FULL_SIZE,
@@ -54,7 +54,7 @@ def drift(root, chunk):
 def report(root, name, tracked):
     """The page; of the neutral alone, as a plain take has it, where it is not tracked."""
     run_script(
-        "multiview_report",
+        "multiview/multiview_report",
         wildcards={**PLACE, "take": name},
         params={"cfg": FULL_SIZE, "source": str(root / "rom"), "neutral": 0},
         input={

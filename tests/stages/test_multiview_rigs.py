@@ -10,10 +10,10 @@ import pytest
 
 from tests import lip_patch
 from tests.stages.multiview_jobs import POSES, make_capture, reconstruct, surface_error_mm
-from vermilion.camera import look_at, pinhole
-from vermilion.images import linear_to_srgb, write_image
-from vermilion.sequences import read_sequence
-from vermilion.tables import read_table
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.imaging.images import linear_to_srgb, write_image
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import read_table
 
 UP = np.array([0.0, 1.0, 0.0])
 #: Camera -> exposure against the others.

@@ -8,11 +8,11 @@ import pytest
 from tests.stages.run_script import run_script
 from tests.unit.photometric_scene import CAMERA, mesh_of, motion, picture_of
 from tests.unit.test_joint_identity import PERSON, model_with_identities
-from vermilion.camera import write_cameras
 from vermilion.config.tracking import TrackingConfig
-from vermilion.errors import InputError
-from vermilion.images import read_image, write_image
+from vermilion.geometry.camera import write_cameras
+from vermilion.imaging.images import read_image, write_image
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.errors import InputError
 from vermilion.tracking.result import Identity
 
 pytestmark = pytest.mark.slow
@@ -48,7 +48,7 @@ def capture(root):
 
 def run(root, inputs, params):
     run_script(
-        "picture_identity",
+        "tracking/picture_identity",
         wildcards={"subject": "s"},
         params=params,
         input=inputs,

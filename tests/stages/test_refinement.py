@@ -9,9 +9,9 @@ from tests.stages.run_script import run_script
 from tests.unit.photometric_scene import CAMERA, dome, mesh_of, motion, picture_of, take_parts
 from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
-from vermilion.images import read_image, write_image
-from vermilion.sequences import read_sequence
-from vermilion.tables import read_table
+from vermilion.imaging.images import read_image, write_image
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import read_table
 from vermilion.tracking.result import TrackedTake
 
 pytestmark = pytest.mark.slow
@@ -58,7 +58,7 @@ def run_stage(root, sizes):
     both = {"tracker": root / "tracker.npz", "identity": root / "identity.npz"}
     before = both | {"fit": root / "landmark_fit.npz"}
     run_script(
-        "appearance",
+        "tracking/appearance",
         wildcards=NAMES,
         params={"cfg": cfg, "source": str(root)},
         input=before | {"landmarks": landmarks},
@@ -67,14 +67,14 @@ def run_stage(root, sizes):
     with_appearance = {"appearance": root / "appearance.npz"}
     for frames, path in zip(chunks, landmarks, strict=True):
         run_script(
-            "photometric",
+            "tracking/photometric",
             wildcards=NAMES,
             params={"cfg": cfg, "source": str(root), "frames": frames},
             input=before | with_appearance | {"landmarks": path},
             output={0: root / "photometric" / path.name},
         )
     run_script(
-        "photometric_join",
+        "tracking/photometric_join",
         wildcards=NAMES,
         params={"cfg": cfg, "fps": 30.0},
         input=before
@@ -85,14 +85,14 @@ def run_stage(root, sizes):
     for frames, path in zip(chunks, landmarks, strict=True):
         offsets = root / "offsets" / f"{path.stem}.npy"
         run_script(
-            "corrective_layer",
+            "tracking/corrective_layer",
             wildcards=NAMES,
             params={"cfg": cfg, "source": str(root), "frames": frames},
             input=after | {"landmarks": path},
             output={0: offsets},
         )
         run_script(
-            "residuals",
+            "tracking/residuals",
             wildcards=NAMES,
             params={"cfg": cfg, "source": str(root), "frames": frames, "steps": STEPS},
             input=after

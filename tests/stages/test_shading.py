@@ -5,13 +5,13 @@ import pytest
 
 from tests.stages.run_script import run_script
 from tests.stages.test_detail import CAMERA, MODEL, write_take
+from vermilion.appearance.harmonics import irradiance
 from vermilion.config.detail import DetailConfig
-from vermilion.images import read_channels, read_image
-from vermilion.mesh import vertex_normals
-from vermilion.photometric.harmonics import irradiance
-from vermilion.raycast import RayCaster, interpolate
-from vermilion.sequences import read_mesh, read_sequence
-from vermilion.tables import read_table
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.imaging.images import read_channels, read_image
+from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.tables import read_table
 
 N_FRAMES = 6
 
@@ -51,13 +51,15 @@ def run_stage(root, paths):
     files["light"] = out / "light.npz"
     place = {"subject": "s", "take": "t"}
     made = {"light": files["light"], "topology": out / "topology.obj"}
-    run_script("shading_light", wildcards=place, params=params, input=files, output=made)
+    run_script("detail/shading_light", wildcards=place, params=params, input=files, output=made)
     reliefs = [out / "relief" / f"{path.stem}.npz" for path in paths]
     for relief in reliefs:
         first, last = (int(n) for n in relief.stem.split("-"))
         params["frames"] = list(range(first, last + 1))
         made = {"relief": relief}
-        run_script("shading_relief", wildcards=place, params=params, input=files, output=made)
+        run_script(
+            "detail/shading_relief", wildcards=place, params=params, input=files, output=made
+        )
     for path in paths:
         first, last = (int(n) for n in path.stem.split("-"))
         params["frames"] = list(range(first, last + 1))
@@ -70,7 +72,9 @@ def run_stage(root, paths):
             "after": out / f"after{path.stem}.tsv",
         }
         inputs = {**files, "reliefs": reliefs}
-        run_script("shading_meshes", wildcards=place, params=params, input=inputs, output=made)
+        run_script(
+            "detail/shading_meshes", wildcards=place, params=params, input=inputs, output=made
+        )
     return read_sequence([out / path.name for path in paths])
 
 

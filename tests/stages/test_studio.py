@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from vermilion.camera import read_cameras, write_cameras
 from vermilion.faces.procedural import studio_model
-from vermilion.files import sha256_of
-from vermilion.images import read_image
-from vermilion.raycast import RayCaster
-from vermilion.sequences import read_sequence
+from vermilion.geometry.camera import read_cameras, write_cameras
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.images import read_image
+from vermilion.storage.files import sha256_of
+from vermilion.storage.sequences import read_sequence
 from vermilion.studio.capture_writer import (
     label_path,
     picture_path,

@@ -8,12 +8,12 @@ import pytest
 from tests.stages.run_script import run_script
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
-from vermilion.camera import look_at, pinhole, write_cameras
 from vermilion.config.tracking import MeshesConfig, TrackingConfig
-from vermilion.images import read_image, write_image
+from vermilion.geometry.camera import look_at, pinhole, write_cameras
+from vermilion.imaging.images import read_image, write_image
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.sequences import read_mesh, read_sequence
-from vermilion.tables import read_table
+from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.tables import read_table
 from vermilion.tracking.result import Identity, TrackedTake
 
 N_FRAMES = 12
@@ -59,7 +59,7 @@ def run_stage(root, sizes, missing=()):
     take = {"take": "t", "camera": "cam", "neutral": 0, "chunks": len(sizes)}
     names = {"subject": "s", "take": "t"}
     run_script(
-        "identity",
+        "tracking/identity",
         wildcards={"subject": "s"},
         params={"cfg": cfg, "takes": [take]},
         input={
@@ -72,7 +72,7 @@ def run_stage(root, sizes, missing=()):
     )
     both = {"tracker": tracker, "identity": root / "identity.npz"}
     run_script(
-        "tracking",
+        "tracking/tracking",
         wildcards=names,
         params={"cfg": cfg, "camera": "cam", "fps": 30.0},
         input=both | {"landmarks": landmarks, "cameras": root / "cameras"},
@@ -81,7 +81,7 @@ def run_stage(root, sizes, missing=()):
     for frames, path in zip(chunks, landmarks, strict=True):
         name = f"{frames[0]:06d}"
         run_script(
-            "tracking_meshes",
+            "tracking/tracking_meshes",
             wildcards=names,
             params={"cfg": cfg, "source": str(root), "frames": [int(f) for f in frames]},
             input=both | {"fit": root / "fit.npz", "landmarks": path},
@@ -141,7 +141,7 @@ def test_frames_without_landmarks_are_flagged_and_interpolated(results, tmp_path
 def test_topology_and_sequences_of_other_trackers(results, tmp_path):
     _, meshes = results
     run_script(
-        "tracked_meshes",
+        "tracking/tracked_meshes",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": {"tracking.external": {"unit_mm": None}}, "frames": [3, 4]},
         input={"source": _archive(tmp_path, meshes)},
@@ -149,7 +149,7 @@ def test_topology_and_sequences_of_other_trackers(results, tmp_path):
     )
     assert np.array_equal(read_sequence(tmp_path / "C.npy"), meshes[3:5])
     run_script(
-        "tracked_topology",
+        "tracking/tracked_topology",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": {"tracking.external": {"unit_mm": None}}, "first": 3},
         input={"source": tmp_path / "other.npz"},

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.labels import ContourLabel, Polyline
-from vermilion.images import srgb_to_linear
+from vermilion.imaging.images import srgb_to_linear
 
 SKIN, LIP, DARK = (0.72, 0.55, 0.45), (0.66, 0.36, 0.36), (0.12, 0.08, 0.08)
 
@@ -132,7 +132,7 @@ def mouth_model(opening=10.0, height=26.0, width=52.0, n=60):
 
 def facing_camera(scale=1.0, angle=0.0, shift=(0.0, 0.0), size=(240, 240), distance_mm=1000.0):
     """A camera that sees `mouth_model` exactly as `draw_mouth` draws it."""
-    from vermilion.camera import Camera
+    from vermilion.geometry.camera import Camera
 
     turn = np.array(
         [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]

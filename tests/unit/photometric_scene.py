@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera, pinhole
+from vermilion.appearance.harmonics import irradiance
 from vermilion.faces.model import REGIONS, FaceModel
+from vermilion.geometry.camera import Camera, pinhole
+from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.mesh import normalised, vertex_normals
-from vermilion.photometric.harmonics import irradiance
-from vermilion.photometric.take import TakeStart
-from vermilion.raycast import RayCaster, interpolate
-from vermilion.tracking.expression import HeadMotion
-from vermilion.tracking.pose import rotation_of
+from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.landmark_fit.expression import HeadMotion
+from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import FitSettings
 

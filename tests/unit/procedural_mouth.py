@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.heads import SLIGHTLY_OPEN
 from vermilion.faces.model import FaceModel
-from vermilion.raycast import RayCaster
+from vermilion.geometry.raycast import RayCaster
 
 
 def weights_of(model: FaceModel, **weights: float) -> np.ndarray:

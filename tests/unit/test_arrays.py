@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.errors import ModelFileError
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import ModelFileError
 
 
 @pytest.mark.parametrize("compressed", [False, True])

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from vermilion.camera import Camera, look_at
 from vermilion.capture.board import Board, BoardDetector
 from vermilion.capture.calibrate import calibrate_rig
-from vermilion.errors import InputError
-from vermilion.mesh import rigid_alignment
+from vermilion.geometry.camera import Camera, look_at
+from vermilion.geometry.mesh import rigid_alignment
+from vermilion.storage.errors import InputError
 
 BOARD = Board("charuco", (9, 7), 20.0, 15.0, "DICT_4X4_50")
 CHECKERS = Board("checkerboard", (9, 8), 20.0)

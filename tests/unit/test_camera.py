@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vermilion.camera import Camera, look_at, pinhole, read_cameras, write_cameras
-from vermilion.errors import InputError
+from vermilion.geometry.camera import Camera, look_at, pinhole, read_cameras, write_cameras
+from vermilion.storage.errors import InputError
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from vermilion.workflow.checksums import find_damage, record, remove_damaged
+from vermilion.provenance.checksums import find_damage, record, remove_damaged
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vermilion.arrays import write_arrays
-from vermilion.chunks import read_chunks, read_frames
-from vermilion.errors import InputError
-from vermilion.sequences import write_sequence
+from vermilion.storage.arrays import write_arrays
+from vermilion.storage.chunks import read_chunks, read_frames
+from vermilion.storage.errors import InputError
+from vermilion.storage.sequences import write_sequence
 
 
 def written(folder, sizes):

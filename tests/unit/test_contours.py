@@ -19,7 +19,7 @@ from vermilion.contours.paths import cheapest_ring
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
-from vermilion.errors import InputError, ModelFileError
+from vermilion.storage.errors import InputError, ModelFileError
 
 SMALL = TrainingSettings(
     n_features=300,

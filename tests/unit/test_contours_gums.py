@@ -9,7 +9,7 @@ from tests.unit.mouths import draw_mouth
 from vermilion.contours import ridges
 from vermilion.contours.gums import creases, flesh_plane
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
-from vermilion.images import srgb_to_linear
+from vermilion.imaging.images import srgb_to_linear
 
 CENTRE, OPENING, WIDTH = (120.0, 150.0), 22.0, 39.0
 GUM, TEETH = np.array([0.62, 0.38, 0.37]), np.array([0.86, 0.84, 0.80])  # sRGB

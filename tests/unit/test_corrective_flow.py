@@ -4,12 +4,17 @@ import cv2
 import numpy as np
 import pytest
 
-from vermilion.camera import look_at, pinhole
-from vermilion.corrective_flow.crop import Crop
-from vermilion.corrective_flow.deformation import DeformationSettings, corrected_mesh, spread
-from vermilion.corrective_flow.flow import FlowSettings, SixFrames, corrective_flow, pyramid_sizes
-from vermilion.corrective_flow.pose import rigid_motion
-from vermilion.tracking.pose import rotation_of
+from vermilion.detail.flow.crop import Crop
+from vermilion.detail.flow.deformation import DeformationSettings, corrected_mesh, spread
+from vermilion.detail.flow.pose import rigid_motion
+from vermilion.detail.flow.six_frame_flow import (
+    FlowSettings,
+    SixFrames,
+    corrective_flow,
+    pyramid_sizes,
+)
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.tracking.landmark_fit.pose import rotation_of
 
 HEIGHT, WIDTH = 96, 80
 CAMERA = pinhole(

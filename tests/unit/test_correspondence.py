@@ -5,8 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.unit.test_integration import sheet
-from vermilion.camera import look_at, pinhole
-from vermilion.correction.head import align_frames, head_from_world, world_from_head
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.correspondence.correspondence import (
     Correspondence,
@@ -14,15 +12,17 @@ from vermilion.correspondence.correspondence import (
     topology_hash,
 )
 from vermilion.correspondence.landmarks import back_project
-from vermilion.correspondence.registration import register, similarity_alignment
-from vermilion.correspondence.surface_map import (
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.head_frame import align_frames, head_from_world, world_from_head
+from vermilion.geometry.mesh import Mesh, vertex_normals
+from vermilion.geometry.registration import register, similarity_alignment
+from vermilion.geometry.surface_points import (
     SurfaceMap,
     at_vertices,
     closest_barycentric,
     closest_on_surface,
 )
-from vermilion.errors import InputError
-from vermilion.mesh import Mesh, vertex_normals
+from vermilion.storage.errors import InputError
 
 
 def test_closest_point_of_a_triangle_in_every_region():

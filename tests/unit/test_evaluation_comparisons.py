@@ -8,8 +8,8 @@ import pytest
 
 from vermilion.evaluation.comparisons import comparisons, questions_of, rbf_and_affine
 from vermilion.evaluation.errors import ClipSums
-from vermilion.evaluation.feature_tables import estimators, table2, table3
-from vermilion.evaluation.statements import sentence, statements
+from vermilion.report.feature_tables import estimators, table2, table3
+from vermilion.report.statements import sentence, statements
 
 CLIPS = 12
 

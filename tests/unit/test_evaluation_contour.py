@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.heads import small_tracker
-from vermilion.camera import look_at, pinhole
+from vermilion.baselines.contour_tracker import ContourTracker, FoundContours
+from vermilion.baselines.lip_shapes import LipShapes, medoids
 from vermilion.correction.layers import correction_layers
-from vermilion.evaluation.contour_tracker import ContourTracker, FoundContours
-from vermilion.evaluation.lip_shapes import LipShapes, medoids
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.camera import look_at, pinhole
 
 FRONT = np.array([0.0, 0.0, 1.0])
 

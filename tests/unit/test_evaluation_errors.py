@@ -7,7 +7,6 @@ import pytest
 
 from tests import lip_patch
 from tests.unit.evaluation_face import mouth_triangles, sheet_face
-from vermilion.camera import look_at, pinhole
 from vermilion.evaluation.errors import ClipSums, second_differences
 from vermilion.evaluation.lips import LipTolerances, lip_depths
 from vermilion.evaluation.masks import regions_of_mask
@@ -15,7 +14,8 @@ from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
 from vermilion.evaluation.visible import cameras_that_see
-from vermilion.mesh import vertex_areas
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.mesh import vertex_areas
 
 FRAMES = np.arange(10, 16)
 

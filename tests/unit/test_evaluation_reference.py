@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.unit.evaluation_face import sheet_face
-from vermilion.errors import InputError
-from vermilion.evaluation.closest import Surface, SurfacePoints, _closest_of
 from vermilion.evaluation.reference import Reference, drift, reference_of, truth_of_vertices
 from vermilion.faces.lips import lip_labels
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.closest_points import Surface, SurfacePoints, _closest_of
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.storage.errors import InputError
 
 
 def brute_force(points, vertices, triangles, samples=40):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.unit.evaluation_face import sheet_face
-from vermilion.evaluation.mesh_sheets import (
+from vermilion.report.mesh_sheets import (
     clay_columns,
     crop,
     error_columns,

@@ -13,8 +13,8 @@ from vermilion.evaluation.files import load_sums, save_sums
 from vermilion.evaluation.held_out import shown_rows
 from vermilion.evaluation.measures import seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
-from vermilion.evaluation.table1 import in_order, kind_of, table1
-from vermilion.page import number, page, spans, table
+from vermilion.report.page import number, page, spans, table
+from vermilion.report.table1 import in_order, kind_of, table1
 
 SECONDS = ["subject", "take", "regressor", "seconds_per_frame"]
 
@@ -114,7 +114,7 @@ def test_distance_to_a_polyline():
 
 
 def test_contour_error_is_per_interocular_distance():
-    from vermilion.camera import pinhole
+    from vermilion.geometry.camera import pinhole
 
     camera = pinhole("c", 1000.0, 640, 480)
     square = np.array([[-20.0, -20, 500], [20, -20, 500], [20, 20, 500], [-20, 20, 500]])

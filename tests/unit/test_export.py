@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.unit.evaluation_face import sheet_face
-from vermilion.camera import pinhole
 from vermilion.export.objs import write_obj
 from vermilion.export.overlay import (
     SKIN,
@@ -18,8 +17,9 @@ from vermilion.export.overlay import (
 )
 from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
 from vermilion.export.weights import write_weights
-from vermilion.sequences import read_mesh
-from vermilion.video import VideoReader, write_video
+from vermilion.geometry.camera import pinhole
+from vermilion.imaging.video import VideoReader, write_video
+from vermilion.storage.sequences import read_mesh
 
 
 def sequence(frames: int = 4) -> tuple[np.ndarray, np.ndarray]:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.unit.mouths import crest, draw_mouth, ellipse, facing_camera, mouth_model
-from vermilion.errors import InputError
 from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
 from vermilion.features.search import SearchSettings, find_inner, inward_normals
 from vermilion.features.shape_space import head_displacement, shape_space
 from vermilion.features.vector import FeatureTable, feature_names, judge
-from vermilion.mesh import vertex_areas
+from vermilion.geometry.mesh import vertex_areas
+from vermilion.storage.errors import InputError
 
 OUTER_WIDTH = NAMES.index("outer_width")
 

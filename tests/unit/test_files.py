@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vermilion.errors import InputError
-from vermilion.files import atomic_folder, atomic_path
-from vermilion.mesh import Mesh
-from vermilion.quality import QualityRow, flagged_frames, write_quality
-from vermilion.sequences import read_mesh, read_sequence, write_ply, write_sequence
-from vermilion.tables import read_table, write_table
+from vermilion.geometry.mesh import Mesh
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_folder, atomic_path
+from vermilion.storage.quality import QualityRow, flagged_frames, write_quality
+from vermilion.storage.sequences import read_mesh, read_sequence, write_ply, write_sequence
+from vermilion.storage.tables import read_table, write_table
 
 
 def test_failing_writer_leaves_nothing(tmp_path):

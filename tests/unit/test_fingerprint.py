@@ -2,7 +2,7 @@
 
 import pytest
 
-from vermilion.workflow.fingerprint import _direct_imports, _tree, _tree_text, fingerprint
+from vermilion.provenance.fingerprint import _direct_imports, _tree, _tree_text, fingerprint
 
 
 @pytest.fixture

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vermilion.correction.gradients import (
-    correction_gradients,
-    deformation_gradients,
-    triangle_frames,
-)
-from vermilion.correction.head import world_from_head
 from vermilion.correction.layers import (
     correction_layers,
     decode_layers,
     encode_gradients,
     polar_decomposition,
 )
-from vermilion.correction.rotations import rotation_matrix, rotation_vector
 from vermilion.correction.take_layers import displacements, take_layers
+from vermilion.geometry.deformation_gradients import (
+    correction_gradients,
+    deformation_gradients,
+    triangle_frames,
+)
+from vermilion.geometry.head_frame import world_from_head
+from vermilion.geometry.rotations import rotation_matrix, rotation_vector
 
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
 

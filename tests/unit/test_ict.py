@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vermilion.errors import InputError
 from vermilion.faces import ict
 from vermilion.faces.contours import INNER_LOOP, LEFT_CORNER, OUTER_LOOP, RIGHT_CORNER
 from vermilion.faces.ict_archive import check_archive, read_ict
-from vermilion.mesh import boundary_edges, triangle_areas, unique_edges
+from vermilion.geometry.mesh import boundary_edges, triangle_areas, unique_edges
+from vermilion.storage.errors import InputError
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vermilion.errors import InputError
-from vermilion.frames import list_frames, open_frames
-from vermilion.images import (
+from vermilion.imaging.frames import list_frames, open_frames
+from vermilion.imaging.images import (
     image_size,
     linear_to_srgb,
     read_channels,
@@ -18,7 +17,8 @@ from vermilion.images import (
     write_image,
     write_srgb8,
 )
-from vermilion.video import VideoReader, write_video
+from vermilion.imaging.video import VideoReader, write_video
+from vermilion.storage.errors import InputError
 
 
 @given(st.floats(0, 1))

@@ -6,7 +6,7 @@ import pytest
 from vermilion.correction.integration import LayerIntegrator, edge_stiffness
 from vermilion.correction.layers import correction_layers, decode_layers
 from vermilion.correction.right_side import TURN_SERIES, turn_limits
-from vermilion.errors import InputError
+from vermilion.storage.errors import InputError
 
 
 def sheet(n=36, size_mm=180.0):

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from tests.unit.photometric_scene import CAMERA, dome, mesh_of, motion, picture_of
-from vermilion.photometric.joint_identity import PictureSettings, _Round, fit_joint_identity
-from vermilion.photometric.residual import photometric_residual
-from vermilion.photometric.samples import sample_skin
-from vermilion.tracking.expression import FitSettings
-from vermilion.tracking.identity import IdentityProblem, IdentitySettings, TakeSample
-from vermilion.tracking.observation import LandmarkNoise, Observations, focal_px
+from vermilion.appearance.samples import sample_skin
+from vermilion.tracking.identity.joint_identity import PictureSettings, _Round, fit_joint_identity
+from vermilion.tracking.identity.landmark_identity import (
+    IdentityProblem,
+    IdentitySettings,
+    TakeSample,
+)
+from vermilion.tracking.image_fit.residual import photometric_residual
+from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, focal_px
 
 PERSON = np.array([1.3, -1.0])
 N_FRAMES = 5

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from tests.unit.test_landmark_descent import drawn_face
-from vermilion.errors import InputError
-from vermilion.images import linear_to_srgb
+from vermilion.imaging.images import linear_to_srgb
+from vermilion.landmarks.correct_key_frames import settle
 from vermilion.landmarks.correction import FILLED, CorrectionSettings, correct, flow_points
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import BETWEEN, GIVEN, NEUTRAL, KeyFrames, find_key_frames
-from vermilion.landmarks.settle import settle
+from vermilion.storage.errors import InputError
 
 N_FRAMES, STEP_PX = 7, np.array([1.5, -0.75])
 SETTINGS = CorrectionSettings(face_px=120.0)

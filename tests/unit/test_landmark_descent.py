@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from tests.unit.synthetic_face import landmark_layout
-from vermilion.errors import InputError, ModelFileError
-from vermilion.frames import open_frames
-from vermilion.images import linear_to_srgb, srgb_to_linear
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import linear_to_srgb, srgb_to_linear
 from vermilion.landmarks.descent import DescentDetector, Similarity
 from vermilion.landmarks.network_input import network_input
 from vermilion.landmarks.networks import (
@@ -31,6 +30,7 @@ from vermilion.landmarks.training import (
     ridge_regression,
     train_descent,
 )
+from vermilion.storage.errors import InputError, ModelFileError
 
 SETTINGS = TrainingSettings(stages=4, perturbations=4, seed=1)
 

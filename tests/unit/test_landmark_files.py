@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.unit.synthetic_face import landmark_layout
-from vermilion.errors import InputError
 from vermilion.landmarks.detect import detect_frames
 from vermilion.landmarks.detector import Landmarks, LandmarkTrack
 from vermilion.landmarks.labels import label_files, read_label, read_labels
 from vermilion.landmarks.scheme import FROM_68, LIP_INNER, LIP_OUTER, MIRROR, interocular_px
 from vermilion.landmarks.table import read_landmark_csv
 from vermilion.landmarks.views import LandmarkViews
+from vermilion.storage.errors import InputError
 
 
 def face_px():

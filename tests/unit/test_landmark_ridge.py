@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tests.unit.mouths import draw_mouth, ellipse
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
-from vermilion.images import linear_to_srgb, srgb_to_linear
+from vermilion.imaging.images import linear_to_srgb, srgb_to_linear
 
 TONGUE = (0.55, 0.27, 0.30)
 INNER = np.arange(59, 66)

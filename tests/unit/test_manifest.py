@@ -7,13 +7,13 @@ import shutil
 import numpy as np
 import pytest
 
-from vermilion.camera import look_at, pinhole, write_cameras
 from vermilion.capture.board import Board
 from vermilion.capture.manifest import capture_manifest, load_manifest, quality_rows
 from vermilion.capture.rig import image_sizes, rig_cameras
-from vermilion.errors import InputError
-from vermilion.images import write_srgb8
-from vermilion.video import write_video
+from vermilion.geometry.camera import look_at, pinhole, write_cameras
+from vermilion.imaging.images import write_srgb8
+from vermilion.imaging.video import write_video
+from vermilion.storage.errors import InputError
 
 FRAMES = range(4)
 CAMERAS = ("a", "b", "c")

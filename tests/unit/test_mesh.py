@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vermilion.mesh import (
+from vermilion.geometry.mesh import (
     adjacency,
     boundary_edges,
     rigid_alignment,

@@ -10,7 +10,6 @@ from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
-from vermilion.errors import InputError, ModelFileError
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import FORMAT_VERSION, LipModel, load_model, save_model
@@ -21,6 +20,7 @@ from vermilion.regression.training import (
     train,
     training_subjects,
 )
+from vermilion.storage.errors import InputError, ModelFileError
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])
 NAMES = ("shape_01", "shape_02", "outer_width", "lower_lip_1")

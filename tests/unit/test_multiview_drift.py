@@ -7,8 +7,8 @@ import pytest
 from tests import lip_patch
 from vermilion.multiview.drift import ALL, DriftSettings, Origin, carry, drift_rows, neighbours
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.report import Findings, Sheet, choose_frames, report_page
 from vermilion.multiview.views import Frame, make_view
+from vermilion.report.multiview_page import Findings, Sheet, choose_frames, report_page
 
 POSE = (0.7, 0.02)
 SETTINGS = DriftSettings(scale=1.0, min_agreement=0.3, ray_stride_px=1)

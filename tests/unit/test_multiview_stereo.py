@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from vermilion.camera import look_at, pinhole
-from vermilion.errors import InputError
-from vermilion.mesh import Mesh
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.mesh import Mesh
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.pairs import rectify, stereo_pairs
 from vermilion.multiview.stereo import Cloud, match_pair
 from vermilion.multiview.views import View, normalise
+from vermilion.storage.errors import InputError
 
 UP = np.array([0.0, 1.0, 0.0])
 ORIGIN = np.zeros(3)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vermilion.camera import look_at, pinhole
-from vermilion.errors import InputError
+from vermilion.geometry.camera import look_at, pinhole
 from vermilion.multiview.anchors import anchor_window, choose_anchor, clip_frames_of, n_clips
 from vermilion.multiview.contact import Lips, resolve_contact
 from vermilion.multiview.photometric import FlowMatcher
@@ -17,6 +16,7 @@ from vermilion.multiview.views import (
     sample,
     undistorted,
 )
+from vermilion.storage.errors import InputError
 
 UP = np.array([0.0, 1.0, 0.0])
 

@@ -10,9 +10,9 @@ import pytest
 from vermilion.correction.layers import correction_layers
 from vermilion.correction.neutral_pair import NeutralPair, acquainted
 from vermilion.correspondence.correspondence import topology_hash
-from vermilion.errors import InputError
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import LipModel
+from vermilion.storage.errors import InputError
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])
 MASK = np.array([1, 2])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.heads import small_tracker
-from vermilion.camera import look_at, pinhole
 from vermilion.faces.lips import lips_with_inside
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.camera import look_at, pinhole
 
 
 @pytest.fixture(scope="module")

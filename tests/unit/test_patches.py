@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vermilion.camera import look_at, pinhole
 from vermilion.capture.patches import align_patches
 from vermilion.capture.tracks import Tracks
+from vermilion.geometry.camera import look_at, pinhole
 
 NORMAL = np.array([0.2, -0.1, 1.0]) / np.linalg.norm([0.2, -0.1, 1.0])
 UP = np.array([0.0, 1.0, 0.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vermilion.errors import InputError
+from vermilion.storage.errors import InputError
 from vermilion.studio.live_link import arkit_name, read_live_link
 from vermilion.studio.performance import (
     generated_weights,

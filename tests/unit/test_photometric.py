@@ -5,19 +5,19 @@ import pandas as pd
 import pytest
 
 from tests.unit.photometric_scene import LIGHT, dome, mesh_of, motion, picture_of, take_start
-from vermilion.photometric.ablations import ablation_rows
-from vermilion.photometric.appearance import Sightings, estimate_appearance
-from vermilion.photometric.choose import choose_frames
-from vermilion.photometric.display import display_slope, to_display_values
-from vermilion.photometric.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.photometric.harmonics import harmonics, harmonics_jacobian, irradiance
-from vermilion.photometric.join import join_frames
-from vermilion.photometric.layer import CorrectiveLayer, LayerSettings
-from vermilion.photometric.residual import photometric_residual, sample_errors
-from vermilion.photometric.samples import SurfaceSamples, sample_skin
-from vermilion.photometric.surface import SampledFace
-from vermilion.photometric.take import learn_appearance, refine_frames
-from vermilion.tracking.pose import rotation_of
+from vermilion.appearance.estimate import Sightings, estimate_appearance
+from vermilion.appearance.harmonics import harmonics, harmonics_jacobian, irradiance
+from vermilion.appearance.sampled_face import SampledFace
+from vermilion.appearance.samples import SurfaceSamples, sample_skin
+from vermilion.imaging.display import display_slope, to_display_values
+from vermilion.tracking.image_fit.ablations import ablation_rows
+from vermilion.tracking.image_fit.choose_frames import choose_frames
+from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.tracking.image_fit.join import join_frames
+from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
+from vermilion.tracking.image_fit.take import learn_appearance, refine_frames
+from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
 from vermilion.tracking.settings import FitSettings
 
 MODEL = dome()

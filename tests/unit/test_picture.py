@@ -7,19 +7,19 @@ import pytest
 from scipy import sparse
 
 from tests import lip_patch
-from vermilion.correction.apply import correct_with_layers
 from vermilion.correction.constraints import ConstraintSolver, Rows
-from vermilion.correction.integration import LayerIntegrator
-from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.correction.picture import (
+from vermilion.correction.correct import correct_with_layers
+from vermilion.correction.image_agreement import PictureFit
+from vermilion.correction.image_contours import (
     Picture,
     PictureSettings,
     frames_around,
 )
-from vermilion.correction.picture_fit import PictureFit
+from vermilion.correction.integration import LayerIntegrator
+from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, smoothed_motion
-from vermilion.correction.rotations import rotation_matrix
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.rotations import rotation_matrix
 
 N_SAMPLES = 80
 CAMERA = lip_patch.cameras()["front"]

@@ -8,7 +8,7 @@ import pytest
 from tests import heads
 from vermilion.faces.model import REGIONS, FaceModel
 from vermilion.faces.procedural import tracker_model
-from vermilion.mesh import boundary_edges, triangle_areas, unique_edges, vertex_normals
+from vermilion.geometry.mesh import boundary_edges, triangle_areas, unique_edges, vertex_normals
 
 
 @pytest.fixture(params=["studio", "template", "tracker"])

@@ -7,7 +7,7 @@ import pytest
 
 from tests.unit.procedural_mouth import aperture_mm, lip_gap_mm, mouth, visible_red_mm2
 from vermilion.faces.procedural import studio_model
-from vermilion.raycast import RayCaster
+from vermilion.geometry.raycast import RayCaster
 
 # -- expressions ---------------------------------------------------------------------------------
 

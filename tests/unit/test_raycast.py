@@ -3,9 +3,9 @@
 import numpy as np
 from scipy import sparse
 
-from vermilion.camera import look_at, pinhole
-from vermilion.raycast import RayCaster, interpolate
-from vermilion.sparse import CholeskyFactor, cotangent_laplacian
+from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 SQUARE = np.array([[-50.0, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]])
 TWO = np.array([[0, 1, 2], [0, 2, 3]])

@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from vermilion.camera import Camera, look_at
-from vermilion.capture.adjust_poses import lay_onto
+from vermilion.capture.bundle_adjust_poses import lay_onto
 from vermilion.capture.refine import RefineSettings, refine_cameras
 from vermilion.capture.tracks import Features, MatchSettings
+from vermilion.geometry.camera import Camera, look_at
 
 UP = np.array([0.0, -1.0, 0.0])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.heads import small_tracker
-from vermilion.camera import read_cameras, write_cameras
+from vermilion.geometry.camera import read_cameras, write_cameras
 from vermilion.studio import rig
 
 

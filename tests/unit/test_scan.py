@@ -10,10 +10,9 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tests.heads import small_tracker
-from vermilion.errors import InputError
 from vermilion.faces.procedural import tracker_model
+from vermilion.geometry.mesh import Mesh, unique_edges
 from vermilion.landmarks.detector import Landmarks
-from vermilion.mesh import Mesh, unique_edges
 from vermilion.scan.landmarks import (
     ScanLandmarks,
     find_landmarks,
@@ -23,6 +22,7 @@ from vermilion.scan.landmarks import (
 from vermilion.scan.personal import personal_model, searching_vertices, transferred
 from vermilion.scan.read import read_scan
 from vermilion.scan.transfer import DeformationTransfer
+from vermilion.storage.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +151,7 @@ def test_a_registered_pose_of_the_model_itself_transfers_to_itself(generic, stil
 
 def test_the_tracker_takes_a_model_without_identities():
     from tests.unit.test_tracking_identity import MODEL, PERSON, sample
-    from vermilion.tracking.identity import fit_identity
+    from vermilion.tracking.identity.landmark_identity import fit_identity
 
     personal = replace(
         MODEL, neutral_mm=MODEL.neutral_of(PERSON), identities_mm=np.zeros((0, 66, 3))

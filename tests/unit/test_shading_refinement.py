@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from vermilion.mesh import normalised, triangle_normals, vertex_normals
-from vermilion.shading_refinement.combine import combine
-from vermilion.shading_refinement.detail import DetailFilter
-from vermilion.shading_refinement.light import ClipLight, estimate_light
-from vermilion.shading_refinement.normal_map import NormalMap
-from vermilion.shading_refinement.relief import ReliefSettings, deviation, solve_relief
-from vermilion.shading_refinement.sight import Sight
-from vermilion.shading_refinement.subdivision import loop_subdivision
-from vermilion.shading_refinement.tilts import averaged, tangents, tilted, tilts_of
-from vermilion.shading_refinement.topology import FineTopology
-from vermilion.tracking.pose import rotation_of
+from vermilion.detail.relief.combine import combine
+from vermilion.detail.relief.light import ClipLight, estimate_light
+from vermilion.detail.relief.normal_map import NormalMap
+from vermilion.detail.relief.relief import ReliefSettings, deviation, solve_relief
+from vermilion.detail.relief.short_range import DetailFilter
+from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.subdivision import loop_subdivision
+from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.geometry.mesh import normalised, triangle_normals, vertex_normals
+from vermilion.tracking.landmark_fit.pose import rotation_of
 
 SIDE = 41
 FACING = np.diag([1.0, -1.0, -1.0])  # world (y up, z to the viewer) to camera

@@ -5,17 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vermilion.config.takes import Take
-from vermilion.correspondence.correspondence import topology_hash
-from vermilion.database.read import LipDatabase
-from vermilion.database.schema import SubjectEntry, TakeEntry
-from vermilion.database.write import write_database
-from vermilion.evaluation.regressors import (
+from vermilion.config.regressors import (
     regressors_of,
     regressors_of_study,
     trained_on,
     with_variants,
 )
+from vermilion.config.takes import Take
+from vermilion.correspondence.correspondence import topology_hash
+from vermilion.database.read import LipDatabase
+from vermilion.database.schema import SubjectEntry, TakeEntry
+from vermilion.database.write import write_database
 from vermilion.regression.training import Selection, train, training_subjects
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])

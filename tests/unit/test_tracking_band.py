@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from vermilion.tracking.band import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 
 
 def dense(blocks, second, first):

@@ -6,14 +6,14 @@ import pytest
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
 from vermilion.config.tracking import TrackingConfig
-from vermilion.errors import InputError
 from vermilion.landmarks.scheme import EYE_CORNERS
-from vermilion.tracking.expression import FitSettings
-from vermilion.tracking.identity import IdentitySettings, TakeSample, fit_identity
-from vermilion.tracking.observation import LandmarkNoise, Observations, project
-from vermilion.tracking.pose import rotation_of
-from vermilion.tracking.sampling import spread_frames
-from vermilion.tracking.shape import LandmarkShape, landmark_identities, without_size
+from vermilion.storage.errors import InputError
+from vermilion.tracking.identity.landmark_identity import IdentitySettings, TakeSample, fit_identity
+from vermilion.tracking.identity.sampling import spread_frames
+from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, project
+from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
 
 MODEL = synthetic_model()
 PERSON = np.array([1.2, -0.8, 0.5, 1.0])

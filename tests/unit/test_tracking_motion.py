@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.unit.synthetic_face import synthetic_model
-from vermilion.errors import InputError
-from vermilion.tracking.expression import FitSettings, fit_motion
-from vermilion.tracking.observation import Observations, project
-from vermilion.tracking.pose import rotation_of, vector_of
-from vermilion.tracking.shape import LandmarkShape
+from vermilion.storage.errors import InputError
+from vermilion.tracking.landmark_fit.expression import FitSettings, fit_motion
+from vermilion.tracking.landmark_fit.observation import Observations, project
+from vermilion.tracking.landmark_fit.pose import rotation_of, vector_of
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
 
 FOCAL_PX, FPS, N_FRAMES = 1400.0, 30.0, 40
 SHAPE = LandmarkShape.of(synthetic_model())

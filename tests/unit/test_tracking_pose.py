@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.unit.synthetic_face import landmark_layout
-from vermilion.tracking.pose import (
+from vermilion.tracking.landmark_fit.pose import (
     left_jacobian,
     nearest_rotation,
     rotation_of,

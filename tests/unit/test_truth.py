@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from vermilion.errors import InputError
 from vermilion.evaluation.truth import read_curves, read_truth
+from vermilion.storage.errors import InputError
 
 PLACE = {"subject": "anna", "take": "rom"}
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 SNAKEFILE = """
-from vermilion.workflow.cache import roles_of, wildcards_of
+from vermilion.provenance.cache import roles_of, wildcards_of
 
 
 rule all:

@@ -8,7 +8,7 @@ import yaml
 from vermilion.config.load import load_configuration
 from vermilion.config.reference import generated_files
 from vermilion.config.takes import STUDIO
-from vermilion.errors import ConfigurationError
+from vermilion.storage.errors import ConfigurationError
 
 from .conftest import ROOT
 

@@ -9,7 +9,7 @@ import time
 import psutil
 import pytest
 
-from vermilion.workflow import checksums
+from vermilion.provenance import checksums
 
 pytestmark = pytest.mark.slow
 

@@ -5,12 +5,12 @@ import re
 
 import pytest
 
-from vermilion.workflow.fingerprint import imported_files
+from vermilion.provenance.fingerprint import imported_files
 
 from .conftest import ROOT, Project
 
 RULES = sorted((ROOT / "workflow" / "rules").glob("*.smk"))
-SCRIPTS = sorted((ROOT / "workflow" / "scripts").glob("*.py"))
+SCRIPTS = sorted((ROOT / "workflow" / "scripts").rglob("*.py"))
 #: Rules that measure.
 MEASURING = {"evaluate", "evaluate_reconstruction"}
 
@@ -67,7 +67,7 @@ def test_a_change_of_the_evaluation_reruns_nothing_that_comes_before_it():
         if any(found.parent.name == "evaluation" for found in imported_files(path))
     }
     assert measuring == {
-        "evaluate", "evaluate_reconstruction", "evaluation_figures", "evaluation_lip_shapes",
+        "evaluate", "evaluate_reconstruction", "evaluation_figures", "lip_shapes",
         "measures", "summary",
     }  # fmt: skip
 
@@ -105,7 +105,11 @@ def test_no_function_of_a_rule_file_replaces_another():
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
 def test_a_script_is_run_by_one_rule_with_its_own_fingerprint(path):
     text = "".join(rule.read_text() for rule in RULES)
-    assert text.count(f'"../scripts/{path.name}"') == text.count(f'code_of("{path.stem}")') >= 1
+    assert (
+        text.count(f'"../scripts/{path.parent.name}/{path.name}"')
+        == text.count(f'code_of("{path.parent.name}/{path.stem}")')
+        >= 1
+    )
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from vermilion.images import read_image, write_image
+from vermilion.imaging.images import read_image, write_image
 
 pytestmark = pytest.mark.slow
 

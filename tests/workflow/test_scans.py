@@ -5,7 +5,7 @@ import json
 import pytest
 
 from vermilion.config.load import load_configuration
-from vermilion.errors import ConfigurationError
+from vermilion.storage.errors import ConfigurationError
 
 from .test_graph import jobs_of
 

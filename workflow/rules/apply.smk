@@ -92,13 +92,13 @@ rule apply:
         runtime=60,
     params:
         cfg=cfg_of("apply.overlay", "correction.integration", "correction.picture"),
-        code=code_of("apply"),
+        code=code_of("apply/apply"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
         fps=lambda wildcards: take_of(wildcards).fps,
         source=mono_source,
         camera=mono_camera,
     script:
-        "../scripts/apply.py"
+        "../scripts/apply/apply.py"
 
 
 rule apply_export:
@@ -120,10 +120,10 @@ rule apply_export:
         runtime=30,
     params:
         cfg=cfg_of("apply.export"),
-        code=code_of("apply_export"),
+        code=code_of("apply/apply_export"),
         fps=lambda wildcards: take_of(wildcards).fps,
     script:
-        "../scripts/apply_export.py"
+        "../scripts/apply/apply_export.py"
 
 
 rule makeup:
@@ -147,12 +147,12 @@ rule makeup:
         runtime=60,
     params:
         cfg=cfg_of("apply.makeup", "apply.overlay"),
-        code=code_of("makeup"),
+        code=code_of("apply/makeup"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
         fps=lambda wildcards: take_of(wildcards).fps,
         source=mono_source,
     script:
-        "../scripts/makeup.py"
+        "../scripts/apply/makeup.py"
 
 
 rule makeup_join:
@@ -177,6 +177,6 @@ rule makeup_join:
         mem_mb=500,
         runtime=20,
     params:
-        code=code_of("makeup_join"),
+        code=code_of("apply/makeup_join"),
     script:
-        "../scripts/makeup_join.py"
+        "../scripts/apply/makeup_join.py"

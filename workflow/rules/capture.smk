@@ -2,9 +2,9 @@
 
 from functools import cache
 
-from vermilion.frames import list_frames
-from vermilion.images import IMAGE_SUFFIXES
-from vermilion.video import VIDEO_SUFFIXES
+from vermilion.imaging.frames import list_frames
+from vermilion.imaging.images import IMAGE_SUFFIXES
+from vermilion.imaging.video import VIDEO_SUFFIXES
 
 
 @cache
@@ -65,13 +65,13 @@ rule capture:
         runtime=60,
     params:
         cfg=cfg_of("capture.manifest"),
-        code=code_of("capture_manifest"),
+        code=code_of("capture/capture"),
         source=source_of,
         camera=mono_camera,
         multiview=lambda wildcards: take_of(wildcards).is_multiview,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/capture_manifest.py"
+        "../scripts/capture/capture.py"
 
 
 rule cameras:
@@ -92,8 +92,8 @@ rule cameras:
         runtime=60,
     params:
         cfg=cfg_of("capture.calibration", "capture.refinement"),
-        code=code_of("cameras"),
+        code=code_of("capture/cameras"),
         camera=mono_camera,
         frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
     script:
-        "../scripts/cameras.py"
+        "../scripts/capture/cameras.py"

@@ -13,16 +13,16 @@ from snakemake.settings.types import ExecMode
 
 from vermilion.config.load import load_configuration
 from vermilion.config.takes import STUDIO, Take
-from vermilion.errors import ConfigurationError
-from vermilion.evaluation.regressors import (
+from vermilion.storage.errors import ConfigurationError
+from vermilion.config.regressors import (
     regressors_of,
     regressors_of_study,
     trained_on,
     with_variants,
 )
-from vermilion.workflow import checksums
-from vermilion.workflow.cache import roles_of, wildcards_of
-from vermilion.workflow.fingerprint import fingerprint
+from vermilion.provenance import checksums
+from vermilion.provenance.cache import roles_of, wildcards_of
+from vermilion.provenance.fingerprint import fingerprint
 
 IS_MAIN_PROCESS = workflow.exec_mode == ExecMode.DEFAULT
 ORIGIN = ", ".join(str(path) for path in workflow.configfiles)

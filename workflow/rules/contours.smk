@@ -51,12 +51,12 @@ rule contour_detector:
         runtime=30,
     params:
         cfg=cfg_of("contours.detector"),
-        code=code_of("contour_detector"),
+        code=code_of("contours/contour_detector"),
         source=mono_sources,
         capture=source_of,
         camera=mono_camera,
     script:
-        "../scripts/contour_detector.py"
+        "../scripts/contours/contour_detector.py"
 
 
 rule contours:
@@ -79,9 +79,9 @@ rule contours:
         runtime=60,
     params:
         cfg=cfg_of("contours.maps"),
-        code=code_of("contours"),
+        code=code_of("contours/contours"),
         source=mono_source,
         capture=source_of,
         camera=mono_camera,
     script:
-        "../scripts/contours.py"
+        "../scripts/contours/contours.py"

@@ -24,10 +24,10 @@ rule layers:
         runtime=20,
     params:
         cfg=cfg_of("correction.layers"),
-        code=code_of("layers"),
+        code=code_of("correction/layers"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/layers.py"
+        "../scripts/correction/layers.py"
 
 
 NEUTRAL_PAIR = R + "/takes/{subject}/{take}/correction/neutral_pair.npz"
@@ -81,7 +81,7 @@ rule neutral_pair:
         runtime=20,
     params:
         cfg=cfg_of("correction.layers"),
-        code=code_of("neutral_pair"),
+        code=code_of("correction/neutral_pair"),
         frame=neutral_frame,
     script:
-        "../scripts/neutral_pair.py"
+        "../scripts/correction/neutral_pair.py"

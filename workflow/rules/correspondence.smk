@@ -42,7 +42,7 @@ rule correspondence:
         runtime=20,
     params:
         cfg=cfg_of("correspondence"),
-        code=code_of("correspondence"),
+        code=code_of("correspondence/correspondence"),
         take=lambda wildcards: reference_take(wildcards).take,
     script:
-        "../scripts/correspondence.py"
+        "../scripts/correspondence/correspondence.py"

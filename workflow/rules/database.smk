@@ -44,7 +44,7 @@ rule database:
         runtime=60,
     params:
         cfg=cfg_of("database"),
-        code=code_of("database"),
+        code=code_of("database/database"),
         subjects=lambda wildcards: subjects("tattoo"),
         takes=lambda wildcards: [
             {
@@ -58,4 +58,4 @@ rule database:
             for take in database_takes()
         ],
     script:
-        "../scripts/database.py"
+        "../scripts/database/database.py"

@@ -42,9 +42,9 @@ rule detail_flow:
         runtime=120,
     params:
         cfg=cfg_of("detail.face_px", "detail.flow", "detail.deformation", "detail.overlay_frames"),
-        code=code_of("detail_flow"),
+        code=code_of("detail/detail_flow"),
         source=take_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
         span=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
     script:
-        "../scripts/detail_flow.py"
+        "../scripts/detail/detail_flow.py"

@@ -23,7 +23,7 @@ rule lip_shapes:
         runtime=30,
     params:
         cfg=cfg_of("evaluation.contour"),
-        code=code_of("evaluation_lip_shapes"),
+        code=code_of("evaluation/lip_shapes"),
         subjects=trained_subjects(),
         takes=[
             {
@@ -34,7 +34,7 @@ rule lip_shapes:
             for take in takes_that_train()
         ],
     script:
-        "../scripts/evaluation_lip_shapes.py"
+        "../scripts/evaluation/lip_shapes.py"
 
 
 rule evaluate:
@@ -74,12 +74,12 @@ rule evaluate:
             "correction.integration",
             "correction.picture",
         ),
-        code=code_of("evaluate"),
+        code=code_of("evaluation/evaluate"),
         frames=lambda wildcards: take_of(wildcards).test_frames(),
         first=lambda wildcards: take_of(wildcards).first,
         fps=lambda wildcards: take_of(wildcards).fps,
     script:
-        "../scripts/evaluate.py"
+        "../scripts/evaluation/evaluate.py"
 
 
 rule evaluate_reconstruction:
@@ -102,10 +102,10 @@ rule evaluate_reconstruction:
         runtime=120,
     params:
         cfg=cfg_of("evaluation.reference", "evaluation.measures"),
-        code=code_of("evaluate_reconstruction"),
+        code=code_of("evaluation/evaluate_reconstruction"),
         first=lambda wildcards: take_of(wildcards).first,
     script:
-        "../scripts/evaluate_reconstruction.py"
+        "../scripts/evaluation/evaluate_reconstruction.py"
 
 
 rule evaluation_figures:
@@ -152,8 +152,8 @@ rule evaluation_figures:
         runtime=20,
     params:
         cfg=cfg_of("evaluation.figures"),
-        code=code_of("evaluation_figures"),
+        code=code_of("evaluation/evaluation_figures"),
         source=mono_sources,
         camera=mono_camera,
     script:
-        "../scripts/evaluation_figures.py"
+        "../scripts/evaluation/evaluation_figures.py"

@@ -15,9 +15,9 @@ rule face_archive:
         runtime=60,
     params:
         cfg=cfg_of("face_model.url", "face_model.sha256"),
-        code=code_of("face_archive"),
+        code=code_of("face_model/face_archive"),
     script:
-        "../scripts/face_archive.py"
+        "../scripts/face_model/face_archive.py"
 
 
 def face_source(wildcards):
@@ -42,8 +42,8 @@ rule face_model:
         runtime=20,
     params:
         cfg=cfg_of("face_model"),
-        code=code_of("face_model"),
+        code=code_of("face_model/face_model"),
         wc=wildcards_of,
         roles=roles_of,
     script:
-        "../scripts/face_model.py"
+        "../scripts/face_model/face_model.py"

@@ -24,9 +24,9 @@ rule features:
         runtime=30,
     params:
         cfg=cfg_of("features.shape", "features.contours"),
-        code=code_of("features"),
+        code=code_of("features/features"),
         source=mono_source,
         camera=mono_camera,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/features.py"
+        "../scripts/features/features.py"

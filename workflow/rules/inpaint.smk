@@ -37,12 +37,12 @@ rule plain_texture:
         runtime=20,
     params:
         cfg=cfg_of("inpaint.domain", "capture.frontal_camera"),
-        code=code_of("inpaint_plain"),
+        code=code_of("inpaint/plain_texture"),
         take=lambda wildcards: plain_take(wildcards).take,
         neutral=lambda wildcards: plain_take(wildcards).first,
         source=lambda wildcards: source_of(plain_take(wildcards)),
     script:
-        "../scripts/inpaint_plain.py"
+        "../scripts/inpaint/plain_texture.py"
 
 
 rule inpaint_reference:
@@ -65,11 +65,11 @@ rule inpaint_reference:
         runtime=20,
     params:
         cfg=cfg_of("inpaint.domain", "inpaint.mask", "capture.frontal_camera"),
-        code=code_of("inpaint_reference"),
+        code=code_of("inpaint/inpaint_reference"),
         neutral=lambda wildcards: take_of(wildcards).first,
         source=source_of,
     script:
-        "../scripts/inpaint_reference.py"
+        "../scripts/inpaint/inpaint_reference.py"
 
 
 rule inpaint:
@@ -100,8 +100,8 @@ rule inpaint:
             "inpaint.composite",
             "capture.frontal_camera",
         ),
-        code=code_of("inpaint_frames"),
+        code=code_of("inpaint/inpaint"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
         source=source_of,
     script:
-        "../scripts/inpaint_frames.py"
+        "../scripts/inpaint/inpaint.py"

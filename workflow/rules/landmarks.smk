@@ -80,7 +80,7 @@ rule landmark_model:
         runtime=60,
     params:
         cfg=cfg_of("landmarks.training"),
-        code=code_of("landmark_model"),
+        code=code_of("landmarks/landmark_model"),
         wc=wildcards_of,
         roles=roles_of,
         takes=lambda wildcards: [
@@ -88,7 +88,7 @@ rule landmark_model:
             for t in training_takes()
         ],
     script:
-        "../scripts/landmark_model.py"
+        "../scripts/landmarks/landmark_model.py"
 
 
 def given_landmark_labels(wildcards):
@@ -129,13 +129,13 @@ rule landmarks:
         runtime=60,
     params:
         cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
-        code=code_of("landmarks"),
+        code=code_of("landmarks/landmarks"),
         source=mono_source,
         camera=mono_camera,
         frames=lambda wildcards: frames_in(wildcards.chunk),
         model=detector_path,
     script:
-        "../scripts/landmarks.py"
+        "../scripts/landmarks/landmarks.py"
 
 
 if CONFIG.landmarks.correction.mode == "flow":
@@ -159,11 +159,11 @@ if CONFIG.landmarks.correction.mode == "flow":
             runtime=60,
         params:
             cfg=cfg_of("landmarks.key_frames", "landmarks.correction"),
-            code=code_of("landmarks_key_frames"),
+            code=code_of("landmarks/landmarks_key_frames"),
             source=mono_sources,
             camera=mono_camera,
         script:
-            "../scripts/landmarks_key_frames.py"
+            "../scripts/landmarks/landmarks_key_frames.py"
 
     rule landmarks_corrected:
         """Corrects the landmarks of a chunk by flow between key frames (Mono13 5.3)."""
@@ -184,12 +184,12 @@ if CONFIG.landmarks.correction.mode == "flow":
             runtime=120,
         params:
             cfg=cfg_of("landmarks.correction"),
-            code=code_of("landmarks_corrected"),
+            code=code_of("landmarks/landmarks_corrected"),
             source=mono_sources,
             camera=mono_camera,
             frames=lambda wildcards: frames_in(wildcards.chunk),
         script:
-            "../scripts/landmarks_corrected.py"
+            "../scripts/landmarks/landmarks_corrected.py"
 
 
 rule landmarks_views:
@@ -210,10 +210,10 @@ rule landmarks_views:
         runtime=30,
     params:
         cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
-        code=code_of("landmarks_views"),
+        code=code_of("landmarks/landmarks_views"),
         source=source_of,
         frame=lambda wildcards: take_of(wildcards).first,
         model=detector_path,
         csv=lambda wildcards: landmark_csv(wildcards, "{camera}"),
     script:
-        "../scripts/landmarks_views.py"
+        "../scripts/landmarks/landmarks_views.py"

@@ -57,7 +57,7 @@ rule measures:
         runtime=20,
     params:
         cfg=cfg_of("evaluation.measures", "training.regressor"),
-        code=code_of("measures"),
+        code=code_of("evaluation/measures"),
         takes=[{"take": take.name, "role": take.role} for take in evaluated_takes()],
     script:
-        "../scripts/measures.py"
+        "../scripts/evaluation/measures.py"

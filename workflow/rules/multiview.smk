@@ -101,12 +101,12 @@ rule multiview_neutral:
         runtime=30,
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.neutral"),
-        code=code_of("multiview_neutral"),
+        code=code_of("multiview/multiview_neutral"),
         source=source_of,
         frame=lambda wildcards: take_of(wildcards).first,
         first=first_place,
     script:
-        "../scripts/multiview_neutral.py"
+        "../scripts/multiview/multiview_neutral.py"
 
 
 rule multiview_anchor:
@@ -127,12 +127,12 @@ rule multiview_anchor:
         runtime=30,
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
-        code=code_of("multiview_anchor"),
+        code=code_of("multiview/multiview_anchor"),
         source=source_of,
         neutral=lambda wildcards: take_of(wildcards).first,
         window=window_of,
     script:
-        "../scripts/multiview_anchor.py"
+        "../scripts/multiview/multiview_anchor.py"
 
 
 rule multiview_clip:
@@ -154,11 +154,11 @@ rule multiview_clip:
         runtime=60,
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
-        code=code_of("multiview_clip"),
+        code=code_of("multiview/multiview_clip"),
         source=source_of,
         frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
     script:
-        "../scripts/multiview_clip.py"
+        "../scripts/multiview/multiview_clip.py"
 
 
 rule multiview_track:
@@ -179,9 +179,9 @@ rule multiview_track:
         mem_mb=2000,
         runtime=10,
     params:
-        code=code_of("multiview_track"),
+        code=code_of("multiview/multiview_track"),
     script:
-        "../scripts/multiview_track.py"
+        "../scripts/multiview/multiview_track.py"
 
 
 rule multiview_refine:
@@ -207,12 +207,12 @@ rule multiview_refine:
         runtime=60,
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.refine"),
-        code=code_of("multiview_refine"),
+        code=code_of("multiview/multiview_refine"),
         source=source_of,
         neutral=lambda wildcards: take_of(wildcards).first,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/multiview_refine.py"
+        "../scripts/multiview/multiview_refine.py"
 
 
 rule multiview_drift:
@@ -235,12 +235,12 @@ rule multiview_drift:
         runtime=30,
     params:
         cfg=cfg_of("multiview.images", "multiview.drift"),
-        code=code_of("multiview_drift"),
+        code=code_of("multiview/multiview_drift"),
         source=source_of,
         neutral=lambda wildcards: take_of(wildcards).first,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/multiview_drift.py"
+        "../scripts/multiview/multiview_drift.py"
 
 
 def if_tracked(pattern):
@@ -288,8 +288,8 @@ rule multiview_report:
             "multiview.drift",
             "multiview.report",
         ),
-        code=code_of("multiview_report"),
+        code=code_of("multiview/multiview_report"),
         source=source_of,
         neutral=lambda wildcards: take_of(wildcards).first,
     script:
-        "../scripts/multiview_report.py"
+        "../scripts/multiview/multiview_report.py"

@@ -60,10 +60,10 @@ rule appearance:
         runtime=30,
     params:
         cfg=cfg_of("tracking.fit", "tracking.motion", "refinement.appearance", "refinement.fit"),
-        code=code_of("appearance"),
+        code=code_of("tracking/appearance"),
         source=take_source,
     script:
-        "../scripts/appearance.py"
+        "../scripts/tracking/appearance.py"
 
 
 rule photometric:
@@ -86,11 +86,11 @@ rule photometric:
         runtime=60,
     params:
         cfg=cfg_of("tracking.fit", "tracking.motion", "refinement.appearance", "refinement.fit"),
-        code=code_of("photometric"),
+        code=code_of("tracking/photometric"),
         source=mono_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/photometric.py"
+        "../scripts/tracking/photometric.py"
 
 
 if CONFIG.refinement.photometric:
@@ -114,10 +114,10 @@ if CONFIG.refinement.photometric:
             runtime=60,
         params:
             cfg=cfg_of("tracking.fit", "tracking.motion", "refinement.join"),
-            code=code_of("photometric_join"),
+            code=code_of("tracking/photometric_join"),
             fps=lambda wildcards: take_of(wildcards).fps,
         script:
-            "../scripts/photometric_join.py"
+            "../scripts/tracking/photometric_join.py"
 
 
 rule corrective_layer:
@@ -140,11 +140,11 @@ rule corrective_layer:
         runtime=60,
     params:
         cfg=cfg_of("tracking.fit", "tracking.motion", "refinement.appearance", "refinement.offsets"),
-        code=code_of("corrective_layer"),
+        code=code_of("tracking/corrective_layer"),
         source=mono_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/corrective_layer.py"
+        "../scripts/tracking/corrective_layer.py"
 
 
 rule residuals:
@@ -173,12 +173,12 @@ rule residuals:
         cfg=cfg_of(
             "tracking.fit", "tracking.motion", "refinement.appearance", "refinement.overlay_frames"
         ),
-        code=code_of("residuals"),
+        code=code_of("tracking/residuals"),
         source=mono_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
         steps=refinement_steps() or ["landmarks"],
     script:
-        "../scripts/residuals.py"
+        "../scripts/tracking/residuals.py"
 
 
 rule ablations:
@@ -201,6 +201,6 @@ rule ablations:
         mem_mb=500,
         runtime=10,
     params:
-        code=code_of("ablations"),
+        code=code_of("tracking/ablations"),
     script:
-        "../scripts/ablations.py"
+        "../scripts/tracking/ablations.py"

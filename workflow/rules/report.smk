@@ -127,9 +127,9 @@ rule quality:
         mem_mb=1000,
         runtime=20,
     params:
-        code=code_of("quality"),
+        code=code_of("report/quality"),
     script:
-        "../scripts/quality.py"
+        "../scripts/report/quality.py"
 
 
 rule summary:
@@ -184,7 +184,7 @@ rule summary:
             "correction.picture",
             "training",
         ),
-        code=code_of("summary"),
+        code=code_of("report/summary"),
         names={
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),
@@ -206,4 +206,4 @@ rule summary:
             for take in used_takes()
         ],
     script:
-        "../scripts/summary.py"
+        "../scripts/report/summary.py"

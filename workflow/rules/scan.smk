@@ -37,7 +37,7 @@ rule scan:
                 "landmarks.detector", "landmarks.networks", "face_model.template_slight_open"
             ),
         },
-        code=code_of("scan"),
+        code=code_of("scan/scan"),
         model=detector_path,
     script:
-        "../scripts/scan.py"
+        "../scripts/scan/scan.py"

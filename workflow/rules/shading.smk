@@ -94,11 +94,11 @@ rule shading_light:
             "detail.shading.light_frames",
             "detail.shading.detail_mm",
         ),
-        code=code_of("shading_light"),
+        code=code_of("detail/shading_light"),
         source=take_source,
         span=take_span,
     script:
-        "../scripts/shading_light.py"
+        "../scripts/detail/shading_light.py"
 
 
 rule shading_relief:
@@ -129,11 +129,11 @@ rule shading_relief:
             "detail.shading.misplaced_mm",
             "detail.shading.iterations",
         ),
-        code=code_of("shading_relief"),
+        code=code_of("detail/shading_relief"),
         source=take_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/shading_relief.py"
+        "../scripts/detail/shading_relief.py"
 
 
 rule shading_meshes:
@@ -168,9 +168,9 @@ rule shading_meshes:
             "detail.shading.map_px",
             "detail.shading.overlay_frames",
         ),
-        code=code_of("shading_meshes"),
+        code=code_of("detail/shading_meshes"),
         source=take_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
         span=take_span,
     script:
-        "../scripts/shading_meshes.py"
+        "../scripts/detail/shading_meshes.py"

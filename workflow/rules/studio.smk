@@ -157,9 +157,9 @@ for take in [take for take in TAKES if take.source == STUDIO]:
                 "contours": studio_contour_labels(take),
                 "landmarks": studio_landmark_labels(take),
             },
-            code=code_of("studio_rig"),
+            code=code_of("studio/studio_rig"),
         script:
-            "../scripts/studio_rig.py"
+            "../scripts/studio/studio_rig.py"
 
     for chunk in chunks(take.subject, take.take):
 
@@ -187,6 +187,6 @@ for take in [take for take in TAKES if take.source == STUDIO]:
                     "name": take.name,
                     "frames": frames_in(chunk),
                 },
-                code=code_of("studio_take"),
+                code=code_of("studio/studio_take"),
             script:
-                "../scripts/studio_take.py"
+                "../scripts/studio/studio_take.py"

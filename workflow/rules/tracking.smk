@@ -79,10 +79,10 @@ rule identity:
         runtime=30,
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
-        code=code_of("identity"),
+        code=code_of("tracking/identity"),
         takes=sampled_takes,
     script:
-        "../scripts/identity.py"
+        "../scripts/tracking/identity.py"
 
 
 rule picture_identity:
@@ -109,13 +109,13 @@ rule picture_identity:
         runtime=30,
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
-        code=code_of("picture_identity"),
+        code=code_of("tracking/picture_identity"),
         takes=lambda wildcards: [
             row | {"source": mono_sources(take)}
             for row, take in zip(sampled_takes(wildcards), identity_takes(wildcards))
         ],
     script:
-        "../scripts/picture_identity.py"
+        "../scripts/tracking/picture_identity.py"
 
 
 ruleorder: picture_identity > identity
@@ -152,11 +152,11 @@ rule tracking:
         runtime=60,
     params:
         cfg=cfg_of("tracking.fit", "tracking.motion"),
-        code=code_of("tracking"),
+        code=code_of("tracking/tracking"),
         camera=mono_camera,
         fps=lambda wildcards: take_of(wildcards).fps,
     script:
-        "../scripts/tracking.py"
+        "../scripts/tracking/tracking.py"
 
 
 rule tracking_meshes:
@@ -181,11 +181,11 @@ rule tracking_meshes:
         runtime=60,
     params:
         cfg=cfg_of("tracking.meshes"),
-        code=code_of("tracking_meshes"),
+        code=code_of("tracking/tracking_meshes"),
         source=mono_source,
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/tracking_meshes.py"
+        "../scripts/tracking/tracking_meshes.py"
 
 
 rule tracking_topology:
@@ -204,9 +204,9 @@ rule tracking_topology:
         mem_mb=500,
         runtime=10,
     params:
-        code=code_of("tracking_topology"),
+        code=code_of("tracking/tracking_topology"),
     script:
-        "../scripts/tracking_topology.py"
+        "../scripts/tracking/tracking_topology.py"
 
 
 rule tracked_meshes:
@@ -226,10 +226,10 @@ rule tracked_meshes:
         runtime=30,
     params:
         cfg=cfg_of("tracking.external"),
-        code=code_of("tracked_meshes"),
+        code=code_of("tracking/tracked_meshes"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
     script:
-        "../scripts/tracked_meshes.py"
+        "../scripts/tracking/tracked_meshes.py"
 
 
 rule tracked_topology:
@@ -250,10 +250,10 @@ rule tracked_topology:
         runtime=30,
     params:
         cfg=cfg_of("tracking.external"),
-        code=code_of("tracked_topology"),
+        code=code_of("tracking/tracked_topology"),
         first=lambda wildcards: take_of(wildcards).first,
     script:
-        "../scripts/tracked_topology.py"
+        "../scripts/tracking/tracked_topology.py"
 
 
 ruleorder: tracked_meshes > tracking_meshes

@@ -33,6 +33,6 @@ rule train:
         runtime=60,
     params:
         cfg=cfg_of("training"),
-        code=code_of("train"),
+        code=code_of("training/train"),
     script:
-        "../scripts/train.py"
+        "../scripts/training/train.py"

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pycolmap
 
-from vermilion.camera import Camera
-from vermilion.capture.adjust import Observations, RigEstimate, adjust_rig, reprojection
 from vermilion.capture.board import Board
-from vermilion.errors import InputError
+from vermilion.capture.bundle_adjust import Observations, RigEstimate, adjust_rig, reprojection
+from vermilion.geometry.camera import Camera
+from vermilion.storage.errors import InputError
 
 #: Views of the board that one camera needs.
 MIN_VIEWS = 3

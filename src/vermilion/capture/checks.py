@@ -7,7 +7,7 @@ from pathlib import Path
 
 import OpenImageIO as oiio
 
-from vermilion.files import sha256_of
+from vermilion.storage.files import sha256_of
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from vermilion.camera import read_cameras
 from vermilion.capture.checks import check_image, header_size
-from vermilion.errors import InputError, describe_problem
-from vermilion.files import atomic_path, sha256_of
-from vermilion.frames import list_frames
-from vermilion.progress import progress
-from vermilion.quality import QualityRow
-from vermilion.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.frames import list_frames
+from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.storage.errors import InputError, describe_problem
+from vermilion.storage.files import atomic_path, sha256_of
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow
 
 FORMAT_VERSION = 1
 

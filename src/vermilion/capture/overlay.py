@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vermilion.capture.calibrate import Calibration
-from vermilion.draw import draw_points, label, tile, to_display
+from vermilion.imaging.draw import draw_points, label, tile, to_display
 
 SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.camera import Camera
 from vermilion.capture.tracks import Tracks
+from vermilion.geometry.camera import Camera
 
 Greys = Mapping[int, Mapping[str, np.ndarray]]  # frame -> camera -> (h, w) float32
 

@@ -15,8 +15,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vermilion.camera import Camera
-from vermilion.capture.adjust_poses import adjust, lay_onto, midpoints, residuals_px
+from vermilion.capture.bundle_adjust_poses import adjust, lay_onto, midpoints, residuals_px
 from vermilion.capture.patches import Greys, align_patches
 from vermilion.capture.tracks import (
     Features,
@@ -25,6 +24,7 @@ from vermilion.capture.tracks import (
     join_tracks,
     match_frame,
 )
+from vermilion.geometry.camera import Camera
 
 Pictures = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its features
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.camera import Camera, pinhole, read_cameras
 from vermilion.capture.board import Board, BoardDetector, Corners
 from vermilion.capture.calibrate import Calibration, calibrate_rig
 from vermilion.capture.manifest import Manifest
-from vermilion.draw import to_display
-from vermilion.errors import InputError, describe_problem
-from vermilion.images import IMAGE_SUFFIXES, read_image
-from vermilion.progress import progress
+from vermilion.geometry.camera import Camera, pinhole, read_cameras
+from vermilion.imaging.draw import to_display
+from vermilion.imaging.images import IMAGE_SUFFIXES, read_image
+from vermilion.storage.errors import InputError, describe_problem
+from vermilion.storage.progress import progress
 
 
 @dataclass(frozen=True)

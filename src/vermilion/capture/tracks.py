@@ -11,8 +11,8 @@ import pycolmap
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vermilion.camera import Camera
-from vermilion.draw import to_display
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.draw import to_display
 
 
 @dataclass(frozen=True)

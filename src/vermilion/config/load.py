@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
-from vermilion.errors import ConfigurationError, VermilionError
-from vermilion.frames import list_frames
-from vermilion.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.imaging.frames import list_frames
+from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.storage.errors import ConfigurationError, VermilionError
 
 
 def load_configuration(

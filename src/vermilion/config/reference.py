@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from vermilion.config.root import Configuration
 from vermilion.config.takes import COLUMNS, SPLIT
-from vermilion.files import atomic_path
+from vermilion.storage.files import atomic_path
 
 ROLES = ("tattoo", "plain", "video", "tracked")
 

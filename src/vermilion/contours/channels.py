@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.images import linear_to_srgb
+from vermilion.imaging.images import linear_to_srgb
 
 #: Integral images carry this many pixels on each side, so that patches never leave them.
 PAD = 40

@@ -10,13 +10,13 @@ from typing import ClassVar
 import cv2
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.contours.boosting import Forest
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
 from vermilion.contours.labels import CONTOURS
 from vermilion.contours.pool import FeaturePool
 from vermilion.contours.region import MouthRegion, mouth_region
-from vermilion.errors import ModelFileError
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
 

@@ -19,7 +19,7 @@ from vermilion.contours.ridges import blurred_colours
 from vermilion.contours.track_ridge import TrackRidgeDetector
 from vermilion.contours.training import LabelledFrame
 from vermilion.landmarks.scheme import interocular_px
-from vermilion.quality import QualityRow
+from vermilion.storage.quality import QualityRow
 
 
 def outer_offset(

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from vermilion.contours.paths import cheapest_path
-from vermilion.errors import InputError
+from vermilion.storage.errors import InputError
 
 CONTOURS = ("inner", "outer")
 

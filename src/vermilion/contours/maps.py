@@ -9,12 +9,12 @@ import numpy as np
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.labels import ContourLabel
 from vermilion.contours.region import mouth_region, usable
-from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
-from vermilion.images import read_channels, write_channels
+from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.frames import FrameSource
+from vermilion.imaging.images import read_channels, write_channels
 from vermilion.landmarks.scheme import interocular_px
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.quality import QualityRow
 
 INNER_COLOUR, OUTER_COLOUR = (255, 70, 60), (70, 255, 90)
 LABEL_COLOUR = (255, 230, 60)

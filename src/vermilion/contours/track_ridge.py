@@ -29,8 +29,8 @@ from vermilion.contours.lip_planes import BESIDE, dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
 from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
-from vermilion.errors import InputError
-from vermilion.progress import progress
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
 
 STEP_PX = 0.5
 #: Deviation along the contour of what is learnt together (share of the ring).

@@ -30,11 +30,11 @@ from vermilion.contours.labels import (
 )
 from vermilion.contours.pool import FeaturePool, random_pool
 from vermilion.contours.region import apply_affine, mouth_region
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
+from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.progress import progress
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow
 
 
 @dataclass(frozen=True)

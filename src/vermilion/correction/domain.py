@@ -18,8 +18,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from vermilion.errors import InputError
-from vermilion.mesh import adjacency, unique_edges
+from vermilion.geometry.mesh import adjacency, unique_edges
+from vermilion.storage.errors import InputError
 
 #: How stiff a follower's triangle is beside one of the mask.
 FOLLOWER_WEIGHT = 0.05

@@ -35,8 +35,8 @@ from vermilion.correction.right_side import (
     gather,
     turn_limits,
 )
-from vermilion.mesh import vertex_areas
-from vermilion.sparse import CholeskyFactor
+from vermilion.geometry.mesh import vertex_areas
+from vermilion.geometry.sparse import CholeskyFactor
 
 _COTANGENT_RANGE = (0.02, 50.0)
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import normalised, triangle_cross, unique_edges
+from vermilion.geometry.mesh import normalised, triangle_cross, unique_edges
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.contact import lips_of
-from vermilion.raycast import RayCaster
 
 #: The inside of the mouth further than this from where the lips meet does not count (mm).
 _INSIDE_MM = 8.0

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.correction.layers import correction_layers
-from vermilion.errors import InputError
 from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

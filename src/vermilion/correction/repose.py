@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.correction.rotations import rotation_matrix
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.rotations import rotation_matrix
 
 #: Landmarks that stay where they are in the picture: brows and eyes.
 ANCHORS = np.r_[17:27, 36:48]

@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from vermilion.arrays import write_arrays
 from vermilion.correction.domain import mesh_corners
-from vermilion.correction.head import align_frames, head_from_world
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.mesh import vertex_areas
-from vermilion.quality import QualityRow
+from vermilion.geometry.head_frame import align_frames, head_from_world
+from vermilion.geometry.mesh import vertex_areas
+from vermilion.storage.arrays import write_arrays
+from vermilion.storage.quality import QualityRow
 
 
 @dataclass(frozen=True)

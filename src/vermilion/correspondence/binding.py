@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.correspondence.surface_map import SurfaceMap, closest_on_surface
-from vermilion.mesh import Mesh, adjacency, triangle_normals, vertex_normals
+from vermilion.geometry.mesh import Mesh, adjacency, triangle_normals, vertex_normals
+from vermilion.geometry.surface_points import SurfaceMap, closest_on_surface
 
 ROUNDS_A_RING = 10
 

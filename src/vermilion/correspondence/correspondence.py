@@ -12,13 +12,13 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.correspondence.lip_sides import lip_sides
-from vermilion.correspondence.registration import register, sides_of_triangles
-from vermilion.correspondence.surface_map import SurfaceMap, closest_on_surface
-from vermilion.errors import InputError
-from vermilion.mesh import Mesh, triangle_normals
+from vermilion.geometry.mesh import Mesh, triangle_normals
+from vermilion.geometry.registration import register, sides_of_triangles
+from vermilion.geometry.surface_points import SurfaceMap, closest_on_surface
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
 
 FORMAT_VERSION = 1
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.correspondence.surface_map import SurfaceMap
-from vermilion.mesh import Mesh, triangle_normals
-from vermilion.raycast import RayCaster
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import Mesh, triangle_normals
+from vermilion.geometry.raycast import RayCaster
+from vermilion.geometry.surface_points import SurfaceMap
 
 #: Points of the 66-point scheme that mark the face's outline: they slide over the surface.
 JAW = np.arange(17)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from vermilion.mesh import Mesh, unique_edges
+from vermilion.geometry.mesh import Mesh, unique_edges
 
 
 def lip_sides(mesh: Mesh, regions: Mapping[str, np.ndarray]) -> np.ndarray:

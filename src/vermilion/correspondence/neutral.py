@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.correction.head import head_from_world
 from vermilion.correspondence.binding import flipped_triangles
 from vermilion.correspondence.correspondence import Correspondence, find_correspondence
 from vermilion.correspondence.landmarks import EYES, LIPS, back_project, inner_features
-from vermilion.correspondence.surface_map import SurfaceMap, at_vertices, closest_barycentric
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.head_frame import head_from_world
+from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.surface_points import SurfaceMap, at_vertices, closest_barycentric
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.mesh import Mesh
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.quality import QualityRow
 from vermilion.tracking.result import TrackedTake
 
 

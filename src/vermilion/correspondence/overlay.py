@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera, look_at, pinhole
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.correspondence.surface_map import SurfaceMap
-from vermilion.draw import colour_map, draw_mesh, draw_points, label, tile
-from vermilion.mesh import Mesh
+from vermilion.geometry.camera import Camera, look_at, pinhole
+from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.surface_points import SurfaceMap
+from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, label, tile
 
 SCALE_MM = 3.0
 

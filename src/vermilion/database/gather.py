@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays
 from vermilion.database.schema import TakeEntry
-from vermilion.errors import InputError
+from vermilion.storage.arrays import read_arrays
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry, TrainingSet
-from vermilion.errors import InputError
+from vermilion.storage.errors import InputError
 
 #: Fewer frames cannot be cross-validated.
 MIN_FRAMES = 5

@@ -13,9 +13,9 @@ from vermilion.correction.domain import mesh_corners
 from vermilion.correction.layers import NUMBERS
 from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.schema import FORMAT, FORMAT_VERSION, SubjectEntry, TakeEntry
-from vermilion.errors import InputError
-from vermilion.files import atomic_path
-from vermilion.mesh import triangle_areas
+from vermilion.geometry.mesh import triangle_areas
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_path
 
 
 def common_mask(subjects: Sequence[SubjectEntry], min_share: float) -> np.ndarray:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.features.occluding import OccludingContour
+from vermilion.geometry.camera import Camera
 
 
 def distance_to_polyline(points_px: np.ndarray, line_px: np.ndarray, closed: bool) -> np.ndarray:

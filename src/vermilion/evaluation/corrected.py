@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vermilion.correction.apply import Corrector, correct_with_layers
-from vermilion.correction.head import head_from_world, world_from_head
-from vermilion.correction.picture import Picture
-from vermilion.correction.picture_fit import PictureFit
+from vermilion.correction.correct import Corrector, correct_with_layers
+from vermilion.correction.image_agreement import PictureFit
+from vermilion.correction.image_contours import Picture
+from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.regression.model import LipModel
 from vermilion.regression.training import VARIANTS
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vermilion.evaluation.closest import Surface
 from vermilion.evaluation.lips import LipTolerances, aperture_mm, lip_gaps
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import histograms
+from vermilion.geometry.closest_points import Surface
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.evaluation.errors import ClipSums
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:

@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.evaluation.alignment import moved
-from vermilion.evaluation.closest import SurfacePoints
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
 from vermilion.evaluation.reference import Reference, truth_of_vertices
-from vermilion.evaluation.table1 import is_variant
 from vermilion.evaluation.take import TakeResult
 from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
-from vermilion.mesh import triangle_areas
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.closest_points import SurfacePoints
+from vermilion.geometry.frame_alignment import moved
+from vermilion.geometry.mesh import triangle_areas
 from vermilion.regression.model import LipModel
+from vermilion.report.table1 import is_variant
 
 _EYE_CORNERS = (36, 45)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.evaluation.closest import Surface
 from vermilion.faces.lips import lip_labels
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import vertex_areas
+from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.mesh import vertex_areas
 
 #: `visible` is the part of the vermilion that two cameras see in the frame; of **H** alone.
 REGION_NAMES = ("vermilion", "visible", "mouth", "face")

@@ -10,7 +10,7 @@ import pandas as pd
 
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.measures import COLUMNS, measure_rows
-from vermilion.evaluation.table1 import in_order, kind_of
+from vermilion.report.table1 import in_order, kind_of
 
 #: What the rows of several takes together call their subject.
 TOGETHER = "all"

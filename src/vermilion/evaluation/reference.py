@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.evaluation.closest import Surface, SurfacePoints
-from vermilion.mesh import triangle_normals, vertex_normals
+from vermilion.geometry.closest_points import Surface, SurfacePoints
+from vermilion.geometry.mesh import triangle_normals, vertex_normals
+from vermilion.storage.errors import InputError
 
 _CROP_MARGIN_MM = 25.0
 

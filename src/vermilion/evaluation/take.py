@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vermilion.evaluation.alignment import align_frames, moved
 from vermilion.evaluation.errors import (
     ClipSums,
     by_clip,
@@ -35,7 +34,8 @@ from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
 from vermilion.faces.lips import lips_with_inside
 from vermilion.faces.model import FaceModel
-from vermilion.progress import progress
+from vermilion.geometry.frame_alignment import align_frames, moved
+from vermilion.storage.progress import progress
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.sequences import read_sequence
+from vermilion.storage.errors import InputError
+from vermilion.storage.sequences import read_sequence
 
 _HINT = "Correct the folder that evaluation.truth names, or leave the key empty."
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.evaluation.reference import Reference
-from vermilion.raycast import RayCaster
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster
 
 
 def cameras_that_see(

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from vermilion.camera import Camera
+from vermilion.appearance.harmonics import irradiance
 from vermilion.faces.model import FaceModel
-from vermilion.images import srgb_to_linear
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.imaging.images import srgb_to_linear
 from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT
-from vermilion.mesh import normalised, vertex_normals
-from vermilion.photometric.harmonics import irradiance
-from vermilion.raycast import RayCaster, interpolate
 
 _SMOOTH = 1.5  # vertices of the contour
 _LUMA = np.array([0.2126, 0.7152, 0.0722])

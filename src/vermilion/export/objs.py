@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.files import atomic_path
+from vermilion.storage.files import atomic_path
 
 
 def write_obj(

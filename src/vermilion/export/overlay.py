@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from vermilion.camera import Camera
-from vermilion.draw import label
-from vermilion.export.shading import shade
-from vermilion.files import atomic_path
-from vermilion.mesh import adjacency
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import adjacency
+from vermilion.imaging.draw import label
+from vermilion.imaging.shaded_mesh import shade
+from vermilion.storage.files import atomic_path
 
 SKIN = (0.80, 0.79, 0.77)
 LIPS = (0.86, 0.53, 0.50)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.errors import InputError
 from vermilion.export.overlay import (
     Crop,
     crop_round,
@@ -17,6 +15,8 @@ from vermilion.export.overlay import (
     strips_following,
 )
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
+from vermilion.storage.errors import InputError
 
 _STRIP_HEIGHT = 0.55  # of its width
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.plot import new_figure, plain, save, with_gaps
+from vermilion.imaging.plot import new_figure, plain, save, with_gaps
 
 _LINE, _OUTSIDE, _NOT_CORRECTED = "#2a6f97", "#c8553d", "#dddddd"
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
-from vermilion.camera import Camera
-from vermilion.files import atomic_path
+from vermilion.geometry.camera import Camera
+from vermilion.storage.files import atomic_path
 
 MESH_PATH, CAMERA_PATH = "/Face/corrected", "/Face/camera"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.files import atomic_path
+from vermilion.storage.files import atomic_path
 
 
 def write_weights(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.mesh import incidence
+from vermilion.geometry.mesh import incidence
 
 #: How many nearest vertices' triangles are candidates.
 CANDIDATE_VERTICES = 6

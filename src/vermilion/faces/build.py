@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
+from vermilion.storage.errors import InputError
 
 
 def build_models(

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from vermilion.mesh import unique_edges
+from vermilion.geometry.mesh import unique_edges
 
 #: Points of the 66-point scheme (DESIGN) round the mouth, each loop in order from the subject's
 #: right corner over the upper lip to the left corner and back under the lower lip.

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.errors import InputError
 from vermilion.faces.binding import bind_to_surface
 from vermilion.faces.contours import closed_loop, edge_graph, without_spurs
 from vermilion.faces.model import FaceModel
+from vermilion.storage.errors import InputError
 
 #: Weight of jawOpen at which the lips are so far apart that neither binds to the other.
 APART = 0.5

@@ -25,7 +25,7 @@ from vermilion.faces.contours import (
 from vermilion.faces.decimation import decimate_model
 from vermilion.faces.ict_archive import IctData
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import submesh
+from vermilion.geometry.mesh import submesh
 
 N_STUDIO = 24591
 FACE = slice(0, 9409)

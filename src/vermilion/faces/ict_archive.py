@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.files import atomic_path, sha256_of
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_path, sha256_of
 
 NEUTRAL = "generic_neutral_mesh"
 N_VERTICES = 26719

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import adjacency
+from vermilion.geometry.mesh import adjacency
 
 _GROW_RINGS = 2
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.errors import ModelFileError
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
 from vermilion.features.distances import contour_distances
 from vermilion.features.rings import Ring, lip_rings
 from vermilion.features.search import SearchSettings, find_inner, find_outer
+from vermilion.geometry.camera import Camera
 from vermilion.landmarks.scheme import EYE_CORNERS
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from vermilion.faces.lips import lips_with_inside
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import unique_edges
-from vermilion.mesh_points import MeshPoints
+from vermilion.geometry.mesh import unique_edges
+from vermilion.geometry.mesh_points import MeshPoints
 
 #: Parts that every edge is cut into.
 _PER_EDGE = 4

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.contours.region import MouthRegion
-from vermilion.draw import draw_points, draw_polyline, label, to_display
 from vermilion.features.contour_features import FrameContours
+from vermilion.imaging.draw import draw_points, draw_polyline, label, to_display
 
 MODEL_COLOUR = (90, 160, 255)
 OUTER_COLOUR, INNER_COLOUR, MISSING_COLOUR = (70, 255, 90), (255, 70, 60), (255, 0, 255)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import vertex_areas
+from vermilion.geometry.mesh import vertex_areas
 
 
 @dataclass(frozen=True)

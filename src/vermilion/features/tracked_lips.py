@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import Ring, lip_rings
+from vermilion.geometry.camera import Camera
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.features.contour_features import FrameContours
 from vermilion.features.distances import NAMES
-from vermilion.quality import QualityRow
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.quality import QualityRow
 
 ARRAYS = (
     "frames", "features", "names", "outer_px", "inner_px", "outer_found", "inner_found", "valid",

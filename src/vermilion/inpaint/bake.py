@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import sample
-from vermilion.mesh import normalised, vertex_normals
-from vermilion.raycast import RayCaster
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import blur, fill_holes, luminance, sample, weighted_blur
 from vermilion.inpaint.opening import Opening
-from vermilion.raycast import RayCaster
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import triangle_areas, unique_edges
-from vermilion.raycast import RayCaster
+from vermilion.geometry.mesh import triangle_areas, unique_edges
+from vermilion.geometry.raycast import RayCaster
+from vermilion.storage.errors import InputError
 
 #: A chart may stretch an edge, or shrink a triangle, this much against the lips; else it is a seam.
 _STRETCH_LIMIT = 20.0

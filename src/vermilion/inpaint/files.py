@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
-from vermilion.images import read_channels, write_channels
+from vermilion.imaging.images import read_channels, write_channels
 from vermilion.inpaint.bake import Texture
 from vermilion.inpaint.domain import LipDomain
+from vermilion.storage.errors import InputError
 
 
 def write_texture(

@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from vermilion.images import linear_to_srgb, srgb_to_linear
+from vermilion.imaging.images import linear_to_srgb, srgb_to_linear
 from vermilion.inpaint.fields import blur, luminance
 
 _FINE_PX = 1.5  # scales finer than this Gaussian count as grain

@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
-from vermilion.camera import Camera
-from vermilion.images import linear_to_srgb, srgb_to_linear
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.images import linear_to_srgb, srgb_to_linear
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import sample
-from vermilion.raycast import RayCaster
 
 _MIN_SAMPLES = 60
 #: Lips are darker next to the opening: ink counts in these shades too.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vermilion.draw import label, tile, to_display
+from vermilion.imaging.draw import label, tile, to_display
 from vermilion.inpaint.bake import Texture
 from vermilion.inpaint.paint import Painted
 

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.images import linear_to_srgb
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.images import linear_to_srgb
 from vermilion.inpaint.bake import Texture, bake
 from vermilion.inpaint.composite import (
     Layer,
@@ -24,7 +25,6 @@ from vermilion.inpaint.grain import add_grain, missing_grain
 from vermilion.inpaint.opening import Evidence, Opening, find_opening
 from vermilion.inpaint.seam import seam_gain
 from vermilion.inpaint.shading import Shading, bare_skin, change_ratio, equalised, under_reference
-from vermilion.raycast import RayCaster
 
 
 @dataclass(frozen=True)

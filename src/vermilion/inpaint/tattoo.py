@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.images import linear_to_srgb
+from vermilion.imaging.images import linear_to_srgb
 from vermilion.inpaint.bake import Texture
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import blur, fill_holes

@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.frames import FrameSource
+from vermilion.storage.errors import InputError
 
 
 def read_views(

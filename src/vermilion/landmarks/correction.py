@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from vermilion.errors import InputError
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.flow import FaceFlow, carry_along
 from vermilion.landmarks.key_frames import KeyFrames, without_offset
@@ -22,8 +21,9 @@ from vermilion.landmarks.scheme import (
     N_LANDMARKS,
     face_size_px,
 )
-from vermilion.progress import progress
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow
 
 FILLED = "no face found; filled by the flow"
 

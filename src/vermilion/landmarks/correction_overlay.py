@@ -5,12 +5,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
+from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import KeyFrames
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
+from vermilion.storage.errors import InputError
 
 _SIDE_PX = 480
 _DETECTED, _CORRECTED, _LIPS = (255, 60, 40), (60, 255, 60), (255, 255, 0)

@@ -12,12 +12,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.errors import ModelFileError
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
 from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
 CELLS = 4

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vermilion.draw import draw_points, draw_polyline, label, tile, to_display
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
+from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
-from vermilion.progress import progress
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow
 
 NOT_FOUND = "no face found"
 

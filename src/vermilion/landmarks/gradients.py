@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.images import linear_to_srgb
+from vermilion.imaging.images import linear_to_srgb
 
 N_ORIENTATIONS = 8
 _LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.errors import InputError
 from vermilion.landmarks.appearance import AppearanceSettings, ReferenceShape, describe
 from vermilion.landmarks.descent import Similarity
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import N_LANDMARKS
-from vermilion.progress import progress
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
 
 #: Where a key frame comes from: a person or another tracker; like the neutral; divides a clip.
 GIVEN, NEUTRAL, BETWEEN = "given", "neutral", "between"

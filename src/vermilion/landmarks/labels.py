@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

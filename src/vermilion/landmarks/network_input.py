@@ -6,7 +6,7 @@ import cv2
 import numba
 import numpy as np
 
-from vermilion.images import linear_to_srgb
+from vermilion.imaging.images import linear_to_srgb
 
 SIZE = 224
 _MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)

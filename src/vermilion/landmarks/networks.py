@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.errors import InputError
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.network_input import SIZE, network_input
 from vermilion.landmarks.scheme import N_LANDMARKS
+from vermilion.storage.errors import InputError
 
 FACE_FILE = "mnv3_detection_opt.onnx"
 LANDMARK_FILE = "lm_model0_opt.onnx"

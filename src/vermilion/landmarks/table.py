@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.errors import InputError
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
+from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.descent import (
     DescentDetector,
     Similarity,
@@ -20,7 +19,8 @@ from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.labels import LandmarkLabel
 from vermilion.landmarks.locate import train_locator
 from vermilion.landmarks.scheme import MIRROR, N_LANDMARKS, face_size_px
-from vermilion.progress import progress
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
 
 #: A point this far off (face sizes) is half as sure as one in place.
 _SURE_RADIUS = 0.035

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.scheme import N_LANDMARKS
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.errors import InputError
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import Reference
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.refine import register_frame
 from vermilion.multiview.views import Frame
-from vermilion.raycast import RayCaster
+from vermilion.storage.errors import InputError
 
 LoadFrame = Callable[[int], Frame]
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.files import atomic_path
-from vermilion.mesh import Mesh, normalised, vertex_normals
+from vermilion.geometry.mesh import Mesh, normalised, vertex_normals
 from vermilion.multiview.stereo import Cloud
+from vermilion.storage.files import atomic_path
 
 
 def near_mesh(

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import adjacency, vertex_normals
+from vermilion.geometry.mesh import adjacency, vertex_normals
 
 
 @dataclass(frozen=True)

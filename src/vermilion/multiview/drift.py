@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import see_all
 from vermilion.multiview.pairs import convergence_deg, density
 from vermilion.multiview.photometric import (
@@ -26,7 +27,6 @@ from vermilion.multiview.photometric import (
     sight,
 )
 from vermilion.multiview.views import DEVIATION, Frame
-from vermilion.raycast import RayCaster
 
 #: Rows of all cameras of a frame together.
 ALL = "all"

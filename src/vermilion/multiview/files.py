@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.errors import InputError
 from vermilion.landmarks.views import LandmarkViews
 from vermilion.multiview.anchors import Anchor
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.track import Clip, Track
 from vermilion.multiview.triangulate import SLIDING
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
 
 
 def read_views(

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.photometric import Sight, sight
 from vermilion.multiview.solver import DisplacementSolver, ThinPlate
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.views import Frame
-from vermilion.raycast import RayCaster
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import Mesh
+from vermilion.geometry.mesh import Mesh
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.nonrigid import register_to_cloud
 from vermilion.multiview.pairs import candidate_pairs, stereo_pairs
@@ -20,6 +19,7 @@ from vermilion.multiview.stereo import Cloud, match_pair
 from vermilion.multiview.template_fit import deform_to_landmarks, fit_template
 from vermilion.multiview.triangulate import Triangulated
 from vermilion.multiview.views import Frame
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.mesh import vertex_normals
 from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.stereo import Cloud
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.draw import colour_map, draw_mesh, draw_points, tile
-from vermilion.draw import label as write_label
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, tile
+from vermilion.imaging.draw import label as write_label
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.take import RefinedFrame

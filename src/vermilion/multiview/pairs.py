@@ -9,8 +9,8 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera, pinhole
-from vermilion.errors import InputError
+from vermilion.geometry.camera import Camera, pinhole
+from vermilion.storage.errors import InputError
 
 
 def convergence_deg(a: Camera, b: Camera, target_mm: np.ndarray) -> float:

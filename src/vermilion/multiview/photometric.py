@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.multiview.views import View, sample
-from vermilion.raycast import Hits, RayCaster
 
 
 @dataclass(frozen=True)

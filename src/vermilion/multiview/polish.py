@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.views import Frame
-from vermilion.raycast import RayCaster
 
 
 def normal_offsets(

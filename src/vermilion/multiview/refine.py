@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.mesh import vertex_normals
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import Measurements, Reference, cloud_planes, solve_motion
 from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.views import Frame
-from vermilion.raycast import RayCaster
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from vermilion.mesh import adjacency
-from vermilion.sparse import CholeskyFactor, cotangent_laplacian
+from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.mesh import normalised
+from vermilion.geometry.mesh import normalised
 from vermilion.multiview.pairs import Rectified, rectified_picture, rectify
 from vermilion.multiview.views import View
 

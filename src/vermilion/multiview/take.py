@@ -8,11 +8,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.frames import FrameSource
-from vermilion.mesh import Mesh, vertex_normals
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import Mesh, vertex_normals
+from vermilion.imaging.frames import FrameSource
 from vermilion.multiview.cloud import near_mesh
 from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
 from vermilion.multiview.motion import Reference, cloud_planes
@@ -22,7 +21,8 @@ from vermilion.multiview.refine import Registered, register_frame
 from vermilion.multiview.solver import ThinPlate
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.views import Frame, load_frame, shrunk
-from vermilion.quality import QualityRow
+from vermilion.storage.errors import InputError
+from vermilion.storage.quality import QualityRow
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.errors import InputError
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
 from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.views import Frame, sample
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)

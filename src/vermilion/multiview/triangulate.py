@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vermilion.camera import Camera
+from vermilion.geometry.camera import Camera
 
 #: The jaw's silhouette slides over the skin from view to view: never triangulated.
 SLIDING = np.arange(17)

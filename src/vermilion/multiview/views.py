@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.errors import InputError
-from vermilion.frames import FrameSource
-from vermilion.images import linear_to_srgb
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.frames import FrameSource
+from vermilion.imaging.images import linear_to_srgb
+from vermilion.storage.errors import InputError
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 #: Grey levels of one local deviation in a normalised picture.

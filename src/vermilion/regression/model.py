@@ -10,11 +10,11 @@ import numpy as np
 
 import vermilion
 from vermilion.correspondence.correspondence import topology_hash
-from vermilion.errors import ModelFileError
-from vermilion.files import atomic_path
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
+from vermilion.storage.errors import ModelFileError
+from vermilion.storage.files import atomic_path
 
 FORMAT = "vermilion-regressor"
 FORMAT_VERSION = 4

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from vermilion.database.schema import TrainingSet
-from vermilion.errors import InputError
 from vermilion.regression.cross_validation import (
     Curve,
     Rule,
@@ -23,6 +22,7 @@ from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
+from vermilion.storage.errors import InputError
 
 Kind = Literal["rbf", "affine", "kernel"]
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.correspondence.registration import similarity_alignment
-from vermilion.errors import InputError
+from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.registration import similarity_alignment
 from vermilion.landmarks.detector import LandmarkDetector
 from vermilion.landmarks.scheme import JAW, N_LANDMARKS
-from vermilion.mesh import Mesh
 from vermilion.scan.views import ScanViews, camera_towards
-from vermilion.tables import read_table, write_table
+from vermilion.storage.errors import InputError
+from vermilion.storage.tables import read_table, write_table
 
 INNER = np.arange(len(JAW), N_LANDMARKS)  # the jaw line is a silhouette: another one in each view
 LEAST_GIVEN = 6

@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vermilion.correspondence.surface_map import closest_on_surface
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import Mesh, boundary_edges, triangle_areas, vertex_areas
-from vermilion.quality import QualityRow
+from vermilion.geometry.mesh import Mesh, boundary_edges, triangle_areas, vertex_areas
+from vermilion.geometry.surface_points import closest_on_surface
 from vermilion.scan.fit import ScanFit, fit_landmarks
 from vermilion.scan.landmarks import LEAST_GIVEN, ScanLandmarks
 from vermilion.scan.registration import WAVELENGTHS_MM, register_scan
 from vermilion.scan.transfer import DeformationTransfer
+from vermilion.storage.errors import InputError
+from vermilion.storage.quality import QualityRow
 
 #: Share of the face that a scan must cover, and what a scan is warned of: distance to it, share met.
 _LEAST_COVERED, _FAR_MM, _LITTLE_MET = 0.5, 0.5, 0.8

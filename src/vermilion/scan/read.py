@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from vermilion.errors import InputError
-from vermilion.mesh import Mesh, triangle_areas
+from vermilion.geometry.mesh import Mesh, triangle_areas
+from vermilion.storage.errors import InputError
 
 SUFFIXES = (".obj", ".ply", ".stl")
 LEAST_TRIANGLES = 200

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from vermilion.correspondence.registration import BendingDeformer
-from vermilion.correspondence.surface_map import closest_on_surface
-from vermilion.mesh import Mesh, boundary_edges, vertex_areas, vertex_normals
+from vermilion.geometry.mesh import Mesh, boundary_edges, vertex_areas, vertex_normals
+from vermilion.geometry.registration import BendingDeformer
+from vermilion.geometry.surface_points import closest_on_surface
 
 #: Wavelengths under which differences are smoothed away; one dense search each.
 WAVELENGTHS_MM = (80.0, 50.0, 30.0, 20.0, 12.0, 8.0, 5.0, 4.0, 4.0)

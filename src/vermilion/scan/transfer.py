@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.gradients import deformation_gradients
 from vermilion.correction.integration import cotangents
-from vermilion.sparse import CholeskyFactor
+from vermilion.geometry.deformation_gradients import deformation_gradients
+from vermilion.geometry.sparse import CholeskyFactor
 
 _HELD, _LOOSE = 1e-2, 1e-8
 

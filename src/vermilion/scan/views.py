@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.camera import Camera, look_at, pinhole
+from vermilion.geometry.camera import Camera, look_at, pinhole
+from vermilion.geometry.mesh import Mesh, normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.landmarks.detector import LandmarkDetector, Landmarks
 from vermilion.landmarks.scheme import N_LANDMARKS
-from vermilion.mesh import Mesh, normalised, vertex_normals
-from vermilion.raycast import RayCaster, interpolate
 
 _SKIN = np.array([0.42, 0.30, 0.24])
 _BACKGROUND = 0.15

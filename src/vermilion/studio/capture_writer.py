@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.files import atomic_path
-from vermilion.images import write_image
-from vermilion.progress import progress
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.images import write_image
+from vermilion.storage.files import atomic_path
+from vermilion.storage.progress import progress
 from vermilion.studio.labels import contours, write_contours, write_landmarks
 from vermilion.studio.render import render
 from vermilion.studio.sensor import sensor_noise

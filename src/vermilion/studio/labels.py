@@ -9,10 +9,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
-from vermilion.files import atomic_path
-from vermilion.raycast import RayCaster, interpolate
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.storage.files import atomic_path
 from vermilion.studio.surface import SKIN, Surface
 
 #: Surface further past the meeting line than this is the inside of the mouth, not the lip (mm).

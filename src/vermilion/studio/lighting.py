@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.mesh import vertex_normals
-from vermilion.raycast import RayCaster
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import RayCaster
 from vermilion.studio import kernels
 
 #: Rays start this far off the surface (mm), so that a vertex does not shade itself.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.errors import InputError
+from vermilion.storage.errors import InputError
 
 #: ARKit shapes without a side that models may split in two.
 SPLIT = ("browInnerUp", "cheekPuff")

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.raycast import Hits, RayCaster
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.studio import kernels
 from vermilion.studio.lighting import Lighting, bake, light_directions, smooth_normals
 from vermilion.studio.look import Look, noise_volume

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.camera import Camera, look_at, pinhole
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera, look_at, pinhole
 
 #: Turn about the vertical and height angle of each camera, degrees. Three stereo pairs on the face
 #: (left, front, right), two on the lips (from above, from below).

@@ -16,8 +16,8 @@ from vermilion.faces.contours import (
     upper_side,
 )
 from vermilion.faces.model import FaceModel
-from vermilion.mesh import unique_edges
-from vermilion.sparse import CholeskyFactor, cotangent_laplacian
+from vermilion.geometry.mesh import unique_edges
+from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 SKIN, MOUTH, TEETH, EYE = range(4)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
 from vermilion.studio import rig
 from vermilion.studio.lighting import LIGHTINGS, Lighting
 from vermilion.studio.live_link import read_live_link

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from vermilion.camera import Camera
-from vermilion.draw import draw_mesh, draw_points, draw_polyline, label, tile, to_display
-from vermilion.errors import InputError
 from vermilion.faces.model import FaceModel
-from vermilion.frames import FrameSource
+from vermilion.geometry.camera import Camera
+from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.errors import InputError
 
 _SIDE_PX = 480
 

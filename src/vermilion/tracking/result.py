@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.arrays import read_arrays, write_arrays
-from vermilion.camera import Camera
 from vermilion.faces.model import FaceModel
-from vermilion.tracking.expression import HeadMotion
-from vermilion.tracking.identity import IdentityFit, TakeSample
+from vermilion.geometry.camera import Camera
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.tracking.identity.landmark_identity import IdentityFit, TakeSample
+from vermilion.tracking.landmark_fit.expression import HeadMotion
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from vermilion.tracking.expression import FitSettings
-from vermilion.tracking.identity import IdentitySettings
-from vermilion.tracking.observation import LandmarkNoise
+from vermilion.tracking.identity.landmark_identity import IdentitySettings
+from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.observation import LandmarkNoise
 
 
 def fit_settings(fit: dict[str, Any], motion: dict[str, Any] | None = None) -> FitSettings:

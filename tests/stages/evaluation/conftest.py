@@ -27,7 +27,7 @@ from vermilion.config.evaluation import (
 )
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.files import load_arrays, save_arrays
-from vermilion.sequences import write_sequence
+from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity
 
 SUBJECT = "ana"
@@ -95,7 +95,7 @@ def write_identity(root, subject):
 def run_lip_shapes(root):
     takes = [root / f"takes/{subject}/rom" for subject in SUBJECTS]
     run_script(
-        "evaluation_lip_shapes",
+        "evaluation/lip_shapes",
         params={
             "cfg": CFG,
             "subjects": list(SUBJECTS),
@@ -141,7 +141,7 @@ def evaluate(root, name, truth):
             "neutral_accurate": take / f"multiview/H/{CHUNKS[0]}.npy",
         }
     run_script(
-        "evaluate",
+        "evaluation/evaluate",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={"cfg": CFG, "frames": [BAD_FRAME, *TEST], "first": 0, "fps": 25.0},
         input=inputs,

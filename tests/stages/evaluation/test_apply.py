@@ -11,10 +11,10 @@ from tests.stages.evaluation.conftest import CFG, SUBJECT
 from tests.stages.lip_scene import BAD_FRAME, CHUNKS
 from tests.stages.run_script import run_script
 from vermilion.evaluation.files import load_arrays, save_arrays
-from vermilion.images import write_srgb8
-from vermilion.sequences import read_mesh, read_sequence
-from vermilion.tables import read_table
-from vermilion.video import VideoReader
+from vermilion.imaging.images import write_srgb8
+from vermilion.imaging.video import VideoReader
+from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ def apply_chunk(scene, frames, pictures, out):
     first, last = frames[0], frames[-1]
     name = f"{first:06d}-{last:06d}"
     run_script(
-        "apply",
+        "apply/apply",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={
             "cfg": CFG, "frames": list(frames), "fps": 25.0, "source": str(pictures), "camera": "face2"
@@ -71,7 +71,7 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
     }  # fmt: skip
     save_arrays(out / "fit.npz", {k: v[:12] if k in per_frame else v for k, v in fit.items()})
     run_script(
-        "apply_export",
+        "apply/apply_export",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={"cfg": CFG, "fps": 25.0},
         input={

@@ -8,11 +8,11 @@ import pytest
 from tests.stages.evaluation.conftest import CFG, SUBJECT
 from tests.stages.lip_scene import BAD_FRAME, CHUNKS, TEST, TRAIN
 from tests.stages.run_script import run_script
-from vermilion.camera import look_at, pinhole, write_cameras
-from vermilion.evaluation.lip_shapes import LipShapes
+from vermilion.baselines.lip_shapes import LipShapes
 from vermilion.evaluation.measures import COLUMNS
-from vermilion.sequences import read_sequence
-from vermilion.tables import read_table
+from vermilion.geometry.camera import look_at, pinhole, write_cameras
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -81,7 +81,7 @@ def reconstruction(scene):
     out = scene.root / "evaluation/h"
     take = scene.root / f"takes/{SUBJECT}/rom"
     run_script(
-        "evaluate_reconstruction",
+        "evaluation/evaluate_reconstruction",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={"cfg": CFG, "first": 0},
         input={

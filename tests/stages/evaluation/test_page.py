@@ -10,9 +10,9 @@ from tests.stages.evaluation.conftest import CFG, MODELS, SUBJECT
 from tests.stages.evaluation.test_measures import reconstruction, values
 from tests.stages.lip_scene import CHUNKS, TEST
 from tests.stages.run_script import run_script
-from vermilion.draw import to_display
-from vermilion.images import write_srgb8
-from vermilion.tables import read_table
+from vermilion.imaging.draw import to_display
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,7 @@ def tables(scene):
     root, out = scene.root, reconstruction(scene)
     ev = root / "evaluation"
     run_script(
-        "measures",
+        "evaluation/measures",
         params={
             "cfg": CFG | {"training.regressor": "kernel"},
             "takes": [{"take": "ana/rom", "role": "tattoo"}],
@@ -52,7 +52,7 @@ def tables(scene):
         output={name: ev / file for name, file in TOGETHER.items()},
     )
     run_script(
-        "evaluation_figures",
+        "evaluation/evaluation_figures",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={
             "cfg": CFG,
@@ -109,7 +109,7 @@ def test_sheets_have_a_column_a_mesh(tables):
 def test_page_is_whole_and_needs_no_network(scene, tables):
     root = scene.root
     run_script(
-        "quality",
+        "report/quality",
         input={"tables": [tables / "truth/quality.tsv"]},
         output={"flagged": root / "quality.tsv"},
     )
@@ -129,7 +129,7 @@ def write_page(root, ev):
     overlay = root / "overlay.png"
     write_srgb8(overlay, to_display(np.full((20, 30, 3), 0.5)))
     run_script(
-        "summary",
+        "report/summary",
         params={
             "cfg": {
                 "evaluation.figures.embed_video_mb": 1.0,

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
-from vermilion.draw import to_display
-from vermilion.errors import InputError
+from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import Texture, bake
 from vermilion.inpaint.composite import Layer, Window, composite
 from vermilion.inpaint.domain import lip_domain
@@ -18,6 +17,7 @@ from vermilion.inpaint.grain import add_grain, fine_deviation, seed_of
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading, bare_skin, change_ratio
 from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.storage.errors import InputError
 
 # Fields
 

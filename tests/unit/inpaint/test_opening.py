@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
+from vermilion.geometry.raycast import RayCaster
 from vermilion.inpaint.opening import Evidence, find_opening
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading
-from vermilion.raycast import RayCaster
 
 
 @pytest.fixture(scope="module")

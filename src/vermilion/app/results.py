@@ -1,0 +1,33 @@
+"""Say where to look when a run has ended."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from vermilion.storage.tables import read_table
+
+
+def summary(results: Path) -> list[str]:
+    """Lines for the terminal: table 1, flagged frames, and the files to open."""
+    lines = []
+    table = results / "evaluation" / "table1.tsv"
+    if table.is_file():
+        lines += ["", read_table(table).to_string(index=False), ""]
+    quality = results / "quality.tsv"
+    if quality.is_file():
+        lines.append(f"{len(read_table(quality))} flagged frame(s): {quality}")
+    for name, what in (
+        ("report.html", "report"),
+        ("evaluation/measures.tsv", "every measure"),
+        ("database/lips.h5", "database"),
+    ):
+        if (results / name).is_file():
+            lines.append(f"{what}: {results / name}")
+    for overlay in sorted(results.glob("apply/*/*/overlay.mp4")):
+        lines.append(f"corrected video: {overlay}")
+    return lines
+
+
+if __name__ == "__main__":
+    print("\n".join(summary(Path(sys.argv[1]))))

@@ -1,0 +1,161 @@
+"""Lighting and albedo of a take from a few of its frames (Lips16 3.2).
+
+Light and albedo can be told apart only by what is usual of skin: it has one colour but for a few
+places (lips, brows, a beard). So the light is first fitted to skin of one colour, with Cauchy
+weights, under which those places count little; the albedo is what is left, and both are then
+improved in turns, the albedo drawn half-way to the one colour while the light is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.appearance.harmonics import harmonics, irradiance
+from vermilion.appearance.samples import SurfaceSamples
+from vermilion.imaging.display import display_slope, to_display_values
+from vermilion.storage.arrays import read_arrays, write_arrays
+
+#: Mean linear albedo that skin is taken to have: scales light against albedo, which no picture tells.
+SKIN_ALBEDO = 0.35
+_ROUNDS = 4
+#: A colour this far off counts half (display values, 0 to 255).
+_ROBUST = 12.0
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """What M frames show at N samples at L resolutions.
+
+    Attributes:
+        colours: (M, L, N, 3) linear RGB.
+        normals: (M, N, 3) unit, camera frame.
+        trust: (M, N) in [0, 1]; zero where not seen.
+    """
+
+    colours: np.ndarray
+    normals: np.ndarray
+    trust: np.ndarray
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """Light, and the skin's colour at each sample.
+
+    Attributes:
+        frames: (M,) int that it was estimated from.
+        triangle, barycentric: of the samples.
+        light: (9, 3) harmonics in the camera frame, linear RGB on a white surface.
+        albedo: (L, N, 3) linear, as seen at each resolution, finest first.
+        spread: (N,) deviation over the frames at the finest resolution, display values (0 to 255).
+        seen: (N,) sum of the frames' trust; samples never seen have 0.
+    """
+
+    frames: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    light: np.ndarray
+    albedo: np.ndarray
+    spread: np.ndarray
+    seen: np.ndarray
+
+    @property
+    def samples(self) -> SurfaceSamples:
+        return SurfaceSamples(self.triangle, self.barycentric)
+
+    def colours(self, normals: np.ndarray, level: int = 0) -> np.ndarray:
+        """Predicted linear RGB (N, 3) of the samples with unit normals (N, 3), camera frame."""
+        return self.albedo[level] * irradiance(normals, self.light)
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        write_arrays(path, **{item.name: getattr(self, item.name) for item in fields(self)})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Appearance:
+        """Read what `save` wrote."""
+        return cls(**read_arrays(path, "appearance", [item.name for item in fields(cls)]))
+
+
+def estimate_appearance(
+    frames: np.ndarray, samples: SurfaceSamples, seen: Sightings, albedo_prior: float
+) -> Appearance:
+    """Light and albedo from sightings of some frames.
+
+    Args:
+        frames: (M,) their numbers.
+        albedo_prior: how many frames' worth the skin's one colour counts at each sample.
+    """
+    finest, trust = seen.colours[:, 0], seen.trust
+    basis = harmonics(seen.normals)
+    skin = middle_colour(finest, trust)
+    light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
+    for _ in range(_ROUNDS):
+        shading = irradiance(seen.normals, light)
+        skin = middle_colour(finest / shading, trust)
+        albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
+        light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
+    # No picture tells a bright light on dark skin from a dim one on fair skin, nor their colours:
+    # the light on the face is white on the whole, the skin as bright as skin is.
+    weight = trust / max(trust.sum(), 1e-12)
+    mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
+    light = light / mean
+    skin = middle_colour(finest / irradiance(seen.normals, light), trust)
+    light = light * (skin.mean() / SKIN_ALBEDO)
+    skin = skin * (SKIN_ALBEDO / skin.mean())
+    shading = irradiance(seen.normals, light)
+    albedo = np.stack(
+        [
+            fit_albedo(seen.colours[:, level], shading, trust, skin, albedo_prior)
+            for level in range(seen.colours.shape[1])
+        ]
+    )
+    error = to_display_values(finest) - to_display_values(albedo[0] * shading)
+    total = trust.sum(axis=0)
+    spread = np.einsum("mn,mn->n", trust, np.abs(error).mean(axis=2)) / np.maximum(total, 1e-9)
+    return Appearance(
+        np.asarray(frames), samples.triangle, samples.barycentric, light, albedo, spread, total
+    )
+
+
+def middle_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
+    """Median colour (3,) of what is well seen."""
+    return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
+
+
+def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
+    """(9, 3) by iteratively reweighted least squares."""
+    seen = trust > 0
+    rows, weights = basis[seen], trust[seen]
+    values = colours[seen]
+    albedos = np.broadcast_to(albedo, colours.shape)[seen]
+    slope = display_slope(values)
+    light = np.zeros((9, 3))
+    ridge = 1e-4 * np.eye(9)
+    robust = np.ones_like(values)
+    for _ in range(rounds):
+        for c in range(3):
+            w = weights * robust[:, c] * slope[:, c] ** 2
+            weighted = rows * (w * albedos[:, c] ** 2)[:, None]
+            matrix = weighted.T @ rows
+            right = rows.T @ (w * albedos[:, c] * values[:, c])
+            light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
+        error = slope * (values - albedos * (rows @ light))
+        robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
+    return light
+
+
+def fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4):
+    """(N, 3) albedo under a known light, drawn to `skin` (3,) by `prior` frames' worth."""
+    robust = np.ones_like(colours)
+    level = (skin * shading.reshape(-1, 3).mean(axis=0)) ** 2 / skin**2
+    for _ in range(rounds):
+        weight = trust[..., None] * robust
+        top = (weight * shading * colours).sum(axis=0) + prior * level * skin
+        albedo = top / ((weight * shading**2).sum(axis=0) + prior * level)
+        albedo = np.maximum(albedo, 1e-3)
+        error = to_display_values(colours) - to_display_values(albedo * shading)
+        robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
+    return albedo

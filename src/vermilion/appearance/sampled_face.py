@@ -1,0 +1,85 @@
+"""The model at its samples: points, normals, and how both change with the blend weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.appearance.samples import SurfaceSamples
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.mesh import incidence, normalised, triangle_cross
+
+
+@dataclass(frozen=True)
+class SampledFace:
+    """One person's face at N samples, linear in the weights, in the head frame.
+
+    Attributes:
+        neutral_mm: (N, 3).
+        expressions_mm: (N, 3, K) float32.
+        neutral_normals: (N, 3) not normalised (area-weighted, mm2).
+        expression_normals: (N, 3, K) float32, their change at weight 1, to first order.
+    """
+
+    neutral_mm: np.ndarray
+    expressions_mm: np.ndarray
+    neutral_normals: np.ndarray
+    expression_normals: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        model: FaceModel,
+        neutral_mm: np.ndarray,
+        samples: SurfaceSamples,
+        displacements_mm: np.ndarray | None = None,
+    ) -> SampledFace:
+        """At `neutral_mm` (V, 3); `displacements_mm` (K, V, 3), by default the expressions."""
+        shapes = model.expressions_mm if displacements_mm is None else displacements_mm
+        at = samples.matrix(model.triangles, model.n_vertices)
+        to_vertices = at @ incidence(model.triangles, model.n_vertices)
+        change = np.stack(
+            [to_vertices @ cross_change(neutral_mm, model.triangles, shape) for shape in shapes],
+            axis=-1,
+        )
+        moved = np.stack([at @ shape.astype(np.float64) for shape in shapes], axis=-1)
+        cross = to_vertices @ triangle_cross(neutral_mm, model.triangles)
+        return cls(at @ neutral_mm, moved.astype(np.float32), cross, change.astype(np.float32))
+
+    def points(self, weights: np.ndarray) -> np.ndarray:
+        """(N, 3) of weights (K,)."""
+        return self.neutral_mm + self.expressions_mm @ weights
+
+    def normals(self, weights: np.ndarray) -> np.ndarray:
+        """(N, 3) unit normals of weights (K,), to first order."""
+        return normalised(self.neutral_normals + self.expression_normals @ weights)
+
+    def through_normals(self, weights: np.ndarray, by_normal: np.ndarray) -> np.ndarray:
+        """Derivative (N, C, K) by the weights of what depends on the normals.
+
+        Args:
+            by_normal: (N, C, 3) its derivative by the unit normal.
+        """
+        cross = self.neutral_normals + self.expression_normals @ weights
+        length = np.linalg.norm(cross, axis=1)[:, None, None]
+        unit = cross[:, None] / length
+        across = by_normal - (by_normal * unit).sum(axis=2, keepdims=True) * unit
+        return (across / length).astype(np.float32) @ self.expression_normals
+
+    def __getitem__(self, rows: np.ndarray | slice) -> SampledFace:
+        return SampledFace(
+            self.neutral_mm[rows],
+            self.expressions_mm[rows],
+            self.neutral_normals[rows],
+            self.expression_normals[rows],
+        )
+
+
+def cross_change(
+    vertices_mm: np.ndarray, triangles: np.ndarray, displacement_mm: np.ndarray
+) -> np.ndarray:
+    """First-order change (T, 3) of `triangle_cross` under a displacement (V, 3)."""
+    a, b, c = (vertices_mm[triangles[:, k]] for k in range(3))
+    da, db, dc = (displacement_mm[triangles[:, k]].astype(np.float64) for k in range(3))
+    return np.cross(db - da, c - a) + np.cross(b - a, dc - da)

@@ -1,0 +1,158 @@
+"""Bundle adjustment of a rig over tracks of unknown points, and the rig's place in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pycolmap
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from vermilion.capture.tracks import Tracks
+from vermilion.geometry.camera import Camera
+
+
+def midpoints(cameras: Mapping[str, Camera], tracks: Tracks) -> np.ndarray:
+    """Point (P, 3) mm nearest to the rays of each track, in least squares."""
+    origins, directions = np.zeros((2, len(tracks.track), 3))
+    for i, name in enumerate(tracks.cameras):
+        mine = tracks.camera == i
+        origins[mine], directions[mine] = cameras[name].rays(tracks.pixels[mine])
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    left, right = np.zeros((tracks.count, 3, 3)), np.zeros((tracks.count, 3))
+    np.add.at(left, tracks.track, across)
+    np.add.at(right, tracks.track, np.einsum("kij,kj->ki", across, origins))
+    return np.linalg.solve(left + 1e-12 * np.eye(3), right[..., None])[..., 0]
+
+
+def adjust(
+    cameras: Mapping[str, Camera],
+    tracks: Tracks,
+    points_mm: np.ndarray,
+    *,
+    free_poses: bool,
+    free_focal: bool = False,
+    loss_px: float = 1.0,
+    centres_mm: Mapping[str, np.ndarray] | None = None,
+    shift_mm: float = 1.0,
+) -> tuple[dict[str, Camera], np.ndarray]:
+    """Points (P, 3), and with them poses and focal lengths, of least robust reprojection error.
+
+    Where `centres_mm` (camera -> (3,)) are given, each centre is drawn to its place: a deviation of
+    `shift_mm` costs as much as one of a pixel. A rig round a small face can bend with hardly any
+    change in the pictures; this is what keeps it from doing so. One thread, so that the sums have
+    one order. The world is nearly free to drift: see `lay_onto`.
+    """
+    model = pycolmap.Reconstruction()
+    seen = np.flatnonzero(tracks.per_camera())
+    index = np.zeros(len(tracks.track), int)
+    for i in seen:
+        name, mine = tracks.cameras[i], tracks.camera == i
+        index[mine] = np.arange(mine.sum())
+        camera = cameras[name].colmap()
+        camera.camera_id = int(i) + 1
+        model.add_camera_with_trivial_rig(camera)
+        image = pycolmap.Image(
+            name=name, keypoints=tracks.pixels[mine], camera_id=int(i) + 1, image_id=int(i) + 1
+        )
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(cameras[name].cam_from_world))
+    order = np.argsort(tracks.track, kind="stable")
+    ends = np.cumsum(np.bincount(tracks.track))
+    for point, rows in zip(points_mm, np.split(order, ends[:-1]), strict=True):
+        elements = [pycolmap.TrackElement(int(tracks.camera[k]) + 1, int(index[k])) for k in rows]
+        model.add_point3D(point, pycolmap.Track(elements))
+    options = pycolmap.BundleAdjustmentOptions()
+    options.refine_focal_length = free_focal and free_poses
+    options.refine_extra_params = options.refine_principal_point = False
+    options.refine_rig_from_world = free_poses
+    options.print_summary = False
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
+    options.ceres.loss_function_scale = loss_px
+    options.ceres.solver_options.num_threads = 1
+    options.ceres.solver_options.max_num_iterations = 100
+    options.ceres.solver_options.function_tolerance = 1e-9
+    config = pycolmap.BundleAdjustmentConfig()
+    for i in seen:
+        config.add_image(int(i) + 1)
+    _adjuster(options, config, model, centres_mm if free_poses else None, shift_mm).solve()
+    moved = dict(cameras)
+    for i in seen:
+        pose = np.asarray(model.images[int(i) + 1].cam_from_world().matrix())
+        params = tuple(float(p) for p in model.cameras[int(i) + 1].params)
+        name = tracks.cameras[i]
+        moved[name] = replace(cameras[name], cam_from_world=pose, params=params)
+    return moved, np.stack([model.points3D[k].xyz for k in sorted(model.points3D)])
+
+
+def _adjuster(options, config, model, centres_mm, shift_mm: float):
+    """COLMAP's adjuster; with a prior on the centres where there are some."""
+    if centres_mm is None:
+        return pycolmap.create_default_bundle_adjuster(options, config, model)
+    priors = []
+    for image in model.images.values():
+        prior = pycolmap.PosePrior()
+        prior.pose_prior_id = image.image_id
+        prior.corr_data_id = image.data_id
+        prior.position = centres_mm[image.name]
+        prior.position_covariance = np.eye(3) * shift_mm**2
+        prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
+        priors.append(prior)
+    prior_options = pycolmap.PosePriorBundleAdjustmentOptions()
+    prior_options.alignment_ransac.random_seed = 0
+    return pycolmap.create_pose_prior_bundle_adjuster(options, prior_options, config, priors, model)
+
+
+def residuals_px(
+    cameras: Mapping[str, Camera], tracks: Tracks, points_mm: np.ndarray
+) -> np.ndarray:
+    """Distance (K,) of each observation to its point's projection; infinite behind the camera."""
+    distance = np.zeros(len(tracks.track))
+    for i, name in enumerate(tracks.cameras):
+        mine = tracks.camera == i
+        expected = cameras[name].project(points_mm[tracks.track[mine]])
+        distance[mine] = np.linalg.norm(expected - tracks.pixels[mine], axis=1)
+    return np.nan_to_num(distance, nan=np.inf)
+
+
+def lay_onto(
+    given: Mapping[str, Camera],
+    moved: Mapping[str, Camera],
+    turn_deg: float,
+    shift_mm: float,
+) -> dict[str, Camera]:
+    """`moved`, turned, shifted and scaled as a whole so that it fits the given poses best.
+
+    Args:
+        turn_deg, shift_mm: deviations to be expected of a given orientation and position; they
+            weigh one against the other. Orientations settle what positions leave open where the
+            cameras stand on a line.
+    """
+    names = sorted(moved)
+    old = np.stack([given[n].rotation for n in names])
+    new = np.stack([moved[n].rotation for n in names])
+    goal = np.stack([given[n].centre_mm for n in names])
+    start = np.stack([moved[n].centre_mm for n in names])
+    middle, target = start.mean(axis=0), goal.mean(axis=0)
+    turned = Rotation.from_matrix(old.transpose(0, 2, 1) @ new)  # what takes moved to given
+    first = turned.mean()
+
+    def parts(x):
+        return Rotation.from_rotvec(x[:3]) * first, np.exp(x[3]), x[4:] + target
+
+    def misfit(x):
+        rotation, scale, place = parts(x)
+        centres = scale * rotation.apply(start - middle) + place
+        angles = (rotation * turned.inv()).as_rotvec(degrees=True)
+        return np.concatenate([((centres - goal) / shift_mm).ravel(), (angles / turn_deg).ravel()])
+
+    x = least_squares(misfit, np.zeros(7), x_scale=[1e-3] * 4 + [1.0] * 3, xtol=1e-14).x
+    rotation, scale, place = parts(x)
+    laid = {}
+    for name, centre in zip(names, start, strict=True):
+        pose = moved[name].rotation @ rotation.as_matrix().T
+        there = scale * rotation.apply(centre - middle) + place
+        pose = np.concatenate([pose, (-pose @ there)[:, None]], axis=1)
+        laid[name] = replace(moved[name], cam_from_world=pose)
+    return laid

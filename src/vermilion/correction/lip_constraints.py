@@ -1,0 +1,148 @@
+"""Constraints on the lips of one frame: on the found contours, touching, never one in the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.correction.constraints import Rows
+from vermilion.correction.lip_crossings import LipCrossings
+from vermilion.features.rings import Ring
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh_points import MeshPoints
+
+#: How far in one lip another lip may lie (mm), and how far apart they are set then.
+SLACK_MM, _APART_MM = 0.01, 0.005
+
+
+@dataclass(frozen=True)
+class LipSamples:
+    """Samples on both contours of a mesh, the outer ring first.
+
+    Attributes:
+        points: m of them, on edges.
+        length_mm: (m,) of contour that each stands for, on the person's neutral.
+    """
+
+    points: MeshPoints
+    length_mm: np.ndarray
+
+    def with_inner(self, samples: np.ndarray, points: MeshPoints) -> LipSamples:
+        """The same with inner samples (k,) at other points (k): those that form the contour now."""
+        vertices, weights = (
+            np.pad(part, ((0, 0), (0, points.vertices.shape[1] - part.shape[1])), mode=mode)
+            for part, mode in ((self.points.vertices, "edge"), (self.points.weights, "constant"))
+        )
+        rows = len(self.points) // 2 + samples
+        vertices[rows], weights[rows] = points.vertices, points.weights
+        return LipSamples(MeshPoints(vertices, weights), self.length_mm)
+
+    @classmethod
+    def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
+        """Of both rings of a face, with lengths on a person's neutral (V, 3)."""
+        lengths = []
+        for ring in (outer, inner):
+            points = ring.points(neutral_mm)
+            steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+            lengths.append(np.full(len(ring), steps.mean()))
+        places = (
+            np.concatenate([getattr(ring, name) for ring in (outer, inner)])
+            for name in ("start", "end", "fraction")
+        )
+        return cls(MeshPoints.on_edges(*places), np.concatenate(lengths))
+
+
+def contour_rows(
+    samples: LipSamples,
+    vertices_mm: np.ndarray,
+    rotation: np.ndarray,
+    translation_mm: np.ndarray,
+    camera: Camera,
+    lines: tuple[np.ndarray, np.ndarray, np.ndarray],
+    weight: float,
+    robust_mm: float,
+) -> Rows:
+    """Each sample projects on its line (point to line, depth free), linearised at the mesh.
+
+    Args:
+        vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
+        lines: (m, 2) points, (m, 2) normals, (m,) known, of `Picture.lines`.
+        weight: of a millimetre of contour.
+        robust_mm: a point this far off counts half.
+    """
+    points_px, normals, known = lines
+    world = samples.points.of(vertices_mm) @ rotation.T + translation_mm
+    across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
+    px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
+    counts = weight * samples.length_mm / (1.0 + (off_mm / robust_mm) ** 2)
+    rows = Rows(
+        samples.points.vertices, samples.points.weights, across / px_per_mm[:, None], off_mm,
+        1.0 / counts, np.zeros(len(off_mm), dtype=bool),
+    )  # fmt: skip
+    return rows[known & np.isfinite(off_mm)]
+
+
+def touch_rows(
+    samples: LipSamples,
+    vertices_mm: np.ndarray,
+    inner_px: np.ndarray,
+    known: np.ndarray,
+    unit_px: float,
+    view: np.ndarray,
+    weight: float,
+    closed: float,
+) -> Rows:
+    """Where the inner contour is closed in the picture, its upper and lower samples meet.
+
+    Args:
+        vertices_mm: (V, 3) head frame.
+        inner_px: (n, 2) found inner ring, known (n,).
+        unit_px: inter-ocular distance.
+        view: (3,) unit direction of the view in the head frame: it and the vertical are held, along
+            the mouth the lips slide.
+        weight: of a millimetre of contour.
+        closed: height of the inner contour per inter-ocular distance, under which it is closed.
+    """
+    n = len(inner_px)
+    upper = np.arange(1, n // 2)
+    lower = n - upper
+    apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
+    touching = (apart < closed) & known[upper] & known[lower]
+    inner = len(samples.points) - n  # where the inner ring begins
+    upper, lower = inner + upper[touching], inner + lower[touching]
+    above, below = samples.points[upper], samples.points[lower]
+    vertices = np.concatenate([above.vertices, below.vertices], axis=1)
+    coefficients = np.concatenate([above.weights, -below.weights], axis=1)
+    vertical = np.array([0.0, 1.0, 0.0]) - view[1] * view
+    axes = np.stack([view, vertical / np.linalg.norm(vertical)])
+    directions = np.repeat(axes, len(upper), axis=0)
+    vertices, coefficients = np.tile(vertices, (2, 1)), np.tile(coefficients, (2, 1))
+    compliance = 1.0 / (weight * np.tile(samples.length_mm[upper], 2))
+    rows = Rows(vertices, coefficients, directions, np.zeros(len(vertices)), compliance,
+                np.zeros(len(vertices), dtype=bool))  # fmt: skip
+    rows.wanted[:] = -rows.of_mesh(vertices_mm)
+    return rows
+
+
+def parting_rows(
+    crossings: LipCrossings, before_mm: np.ndarray, now_mm: np.ndarray
+) -> tuple[Rows, float]:
+    """(one-sided rows that part lips which pass through each other now, greatest depth in mm).
+
+    Args:
+        before_mm, now_mm: (V, 3); rows are for moves from before.
+    """
+    found = crossings.find(now_mm)
+    deepest = found.deepest_mm
+    found = found[found.depth_mm > SLACK_MM]
+    rows = Rows(
+        np.concatenate([found.inside[:, None], found.triangle], axis=1),
+        np.concatenate([np.ones((len(found.inside), 1)), -found.barycentric], axis=1),
+        found.normal, np.zeros(len(found.inside)), np.full(len(found.inside), 1e-5),
+        np.ones(len(found.inside), dtype=bool),
+    )  # fmt: skip
+    # The plane's equation holds at any of its points, so it does at where the edge enters.
+    rows.wanted[:] = _APART_MM - rows.of_mesh(before_mm)
+    return rows, deepest

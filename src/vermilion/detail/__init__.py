@@ -1,0 +1,1 @@
+"""Sequences finer than the coarse track (Mono13 7 and 8)."""

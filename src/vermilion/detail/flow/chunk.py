@@ -1,0 +1,85 @@
+"""Correction of the frames of a chunk; what a frame becomes does not depend on the chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from vermilion.detail.flow.frame import CorrectedFrame, FlowCorrection
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow
+
+
+@dataclass(frozen=True)
+class CorrectedChunk:
+    """Meshes and figures of some frames.
+
+    Attributes:
+        frames: (F,) int.
+        vertices_mm: (F, V, 3) in the world; the coarse mesh where a frame could not be corrected.
+        before, after, flow_px: (F,) as in `CorrectedFrame`; NaN where not corrected.
+        reasons: F texts, empty where corrected.
+    """
+
+    frames: np.ndarray
+    vertices_mm: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    flow_px: np.ndarray
+    reasons: tuple[str, ...]
+
+    def quality(self) -> list[QualityRow]:
+        """A row a frame; a frame whose picture is explained worse than before is warned of."""
+        rows = []
+        for frame, before, after, flow, reason in zip(
+            self.frames, self.before, self.after, self.flow_px, self.reasons, strict=True
+        ):
+            worse = "" if reason or not after > before else "the flow explains the picture worse"
+            figures = {"residual_before": before, "residual_after": after, "flow_px": flow}
+            rows.append(QualityRow(int(frame), not reason, reason or worse, figures))
+        return rows
+
+
+def correct_frames(
+    correction: FlowCorrection,
+    frames: Sequence[int],
+    span: tuple[int, int],
+    read_picture: Callable[[int], np.ndarray],
+    read_mesh: Callable[[int], np.ndarray],
+) -> CorrectedChunk:
+    """Correct frames one by one.
+
+    Args:
+        span: first and last frame of the take; beyond them a frame stands in for its neighbour.
+        read_picture: frame -> linear (h, w, 3), or InputError; read_mesh: frame -> (V, 3).
+    """
+    picture_of = lru_cache(maxsize=4)(read_picture)
+    results = []
+    for frame in progress(list(frames), "corrective flow"):
+        near = [frame, min(frame + 1, span[1]), max(frame - 1, span[0])]
+        try:
+            pictures = [picture_of(f) for f in near]
+            found = correction.correct(pictures, np.stack([read_mesh(f) for f in near]))
+            results.append((found, ""))
+        except InputError as error:
+            results.append((_uncorrected(read_mesh(frame)), f"not corrected: {error}"))
+        except ValueError as error:  # the face left the picture
+            results.append((_uncorrected(read_mesh(frame)), f"not corrected: {error}"))
+    done = [result for result, _ in results]
+    return CorrectedChunk(
+        np.asarray(frames),
+        np.stack([result.vertices_mm for result in done]),
+        np.array([result.before for result in done]),
+        np.array([result.after for result in done]),
+        np.array([result.flow_px for result in done]),
+        tuple(reason for _, reason in results),
+    )
+
+
+def _uncorrected(vertices_mm: np.ndarray) -> CorrectedFrame:
+    nan = float("nan")
+    return CorrectedFrame(np.asarray(vertices_mm, dtype=np.float64), nan, nan, nan)

@@ -1,0 +1,122 @@
+"""Correction of one frame's mesh from three meshes and three pictures (Mono13 section 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vermilion.detail.flow.crop import Crop
+from vermilion.detail.flow.deformation import DeformationSettings, corrected_mesh
+from vermilion.detail.flow.six_frame_flow import FlowSettings, SixFrames, corrective_flow
+from vermilion.detail.flow.synthetic import (
+    FirstFrame,
+    motion_px,
+    photometric_residual,
+    synthesise,
+)
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster
+
+_MARGIN = 0.06
+
+
+@dataclass(frozen=True)
+class CorrectionSettings:
+    """How a frame is corrected.
+
+    Attributes:
+        face_px: the face is never larger than this while flow is computed.
+        flow: weights of the flow.
+        deformation: how far the mesh follows it.
+    """
+
+    face_px: int = 480
+    flow: FlowSettings = field(default_factory=FlowSettings)
+    deformation: DeformationSettings = field(default_factory=DeformationSettings)
+
+
+@dataclass(frozen=True)
+class CorrectedFrame:
+    """What became of a frame.
+
+    Attributes:
+        vertices_mm: (V, 3) in the world.
+        before, after: mean absolute photometric residual over the face, display values 0 to 255, over
+            the pixels that both meshes texture.
+        flow_px: median length of the corrective flow over the face, pixels of the whole picture.
+    """
+
+    vertices_mm: np.ndarray
+    before: float
+    after: float
+    flow_px: float
+
+
+def compared_triangles(model: FaceModel) -> np.ndarray:
+    """(T,) bool: the skin of the face; the inside of the mouth shows what no texture knows."""
+    skin = model.regions["face"] & ~model.regions["mouth_inner"]
+    return skin[model.triangles].all(axis=1)
+
+
+class FlowCorrection:
+    """A take's first frame and settings; `correct` does one frame, whatever its neighbours."""
+
+    def __init__(
+        self,
+        model: FaceModel,
+        camera: Camera,
+        first_picture: np.ndarray,
+        first_mm: np.ndarray,
+        settings: CorrectionSettings,
+    ):
+        """`first_picture` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
+        self.triangles, self.camera, self.settings = model.triangles, camera, settings
+        self.face_vertices = model.regions["face"]
+        self.rigid = model.regions["rigid"]
+        self.face = compared_triangles(model)
+        crop = self._crop(first_mm[None])
+        picture = crop.picture(first_picture)
+        self.first = FirstFrame(picture, crop.camera, first_mm, self.triangles)
+
+    def correct(self, pictures: list[np.ndarray], meshes_mm: np.ndarray) -> CorrectedFrame:
+        """Correct the middle mesh.
+
+        Args:
+            pictures: three linear pictures (h, w, 3): of t, t + 1, t - 1; at an end of the take, t
+                stands in for what is missing.
+            meshes_mm: (3, V, 3) world, in the same order.
+        """
+        meshes = np.asarray(meshes_mm, dtype=np.float64)
+        crop = self._crop(meshes)
+        true = [crop.picture(picture) for picture in pictures]
+        synthetic = [self._draw(crop.camera, m, p) for m, p in zip(meshes, true, strict=True)]
+        frames = SixFrames(
+            np.stack([p for s, f in zip(synthetic, true, strict=True) for p in (s.picture, f)]),
+            np.stack([s.mask for s in synthetic]),
+            np.stack([motion_px(synthetic[0], crop.camera, m, self.triangles) for m in meshes[1:]]),
+        )
+        flow = corrective_flow(frames, self.settings.flow)
+        visible = RayCaster(meshes[0], self.triangles).visible(crop.camera, meshes[0])
+        mesh = corrected_mesh(
+            meshes[0], self.triangles, crop.camera, flow, synthetic[0].mask,
+            visible & self.face_vertices, self.rigid, self.settings.deformation,
+        )  # fmt: skip
+        after = self._draw(crop.camera, mesh, true[0])
+        both = synthetic[0].mask & after.mask
+        enlarged = crop.size_px[0] / crop.camera.width_px
+        length = np.linalg.norm(flow, axis=2)[synthetic[0].mask] * enlarged
+        return CorrectedFrame(
+            mesh,
+            photometric_residual(synthetic[0], true[0], both),
+            photometric_residual(after, true[0], both),
+            float(np.median(length)) if len(length) else float("nan"),
+        )
+
+    def _crop(self, meshes_mm: np.ndarray) -> Crop:
+        points = self.camera.project(meshes_mm[:, self.face_vertices])
+        return Crop.around(self.camera, points, _MARGIN, self.settings.face_px)
+
+    def _draw(self, camera: Camera, mesh_mm: np.ndarray, behind: np.ndarray):
+        return synthesise(self.first, camera, mesh_mm, self.triangles, self.face, behind)

@@ -1,0 +1,55 @@
+"""A checkerboard that sticks to the face: drift shows as squares that swim on the skin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.imaging.draw import label, tile, to_display
+from vermilion.storage.errors import InputError
+from vermilion.tracking.overlay import cut_to
+
+_SQUARES = 40
+_OPACITY = 0.45
+
+
+def draw_checkerboard(
+    picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
+) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with the face in squares of the model's texture coordinates."""
+    hits = RayCaster(vertices_mm, model.triangles).see(camera)
+    uv = interpolate(hits, model.triangles, model.uv.astype(np.float64))
+    dark = np.floor(uv * _SQUARES).astype(int).sum(axis=2) % 2 == 1
+    face = model.regions["face"][model.triangles].all(axis=1)[np.maximum(hits.triangle, 0)]
+    colour = np.where(dark[..., None], np.array([30.0, 60, 160]), np.array([255.0, 240, 150]))
+    opacity = (hits.hit & face)[..., None] * _OPACITY
+    return np.rint(picture * (1 - opacity) + colour * opacity).astype(np.uint8)
+
+
+def checkerboard_sheet(
+    read_picture: Callable[[int], np.ndarray],
+    camera: Camera,
+    model: FaceModel,
+    frames: Sequence[int],
+    before_mm: np.ndarray,
+    after_mm: np.ndarray,
+    count: int,
+) -> np.ndarray:
+    """Some frames, a row each: the picture, then the coarse (F, V, 3) and the corrected meshes."""
+    tiles = []
+    for index in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)):
+        frame = int(frames[index])
+        try:
+            picture = to_display(read_picture(frame))
+        except InputError:
+            picture = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+        place = camera.project(before_mm[index])
+        tiles.append(label(cut_to(picture, place), f"{frame}"))
+        for name, mesh in (("coarse", before_mm[index]), ("corrected", after_mm[index])):
+            drawn = draw_checkerboard(picture, camera, mesh, model)
+            tiles.append(label(cut_to(drawn, place), f"{frame} {name}"))
+    return tile(tiles, 3)

@@ -1,0 +1,48 @@
+"""Positions and normals brought together by linear least squares (Nehab et al. 2005)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.geometry.sparse import CholeskyFactor
+
+_FIRM = 100.0
+
+
+def combine(
+    skin_mm: np.ndarray,
+    smooth: np.ndarray,
+    wanted: np.ndarray,
+    topology: FineTopology,
+    position_weight: float,
+    along_mm: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Displacements (S,) mm along the normals `smooth` (S, 3) that give the skin the normals `wanted`.
+
+    Nehab et al. 2005, eq. 7: edges at right angles to the normals, positions near the found ones
+    `along_mm` (S,) by `position_weight` (1 / mm). Here positions move along the normal only; and as
+    chords of a curved surface are not at right angles to its normals, an edge keeps the angle that it
+    has in the smooth mesh: unchanged normals change nothing. The skin's border stays.
+    """
+    n = len(skin_mm)
+    i, j = topology.edges.T
+    edge = skin_mm[j] - skin_mm[i]
+    length = np.maximum(np.linalg.norm(edge, axis=1), 1e-6)
+    new, old = 0.5 * (wanted[i] + wanted[j]), 0.5 * (smooth[i] + smooth[j])
+    right = -((new - old) * edge).sum(axis=1) / length
+    at_i = -(new * smooth[i]).sum(axis=1) / length
+    at_j = (new * smooth[j]).sum(axis=1) / length
+    rows = np.arange(len(i))
+    slopes = sparse.csr_matrix(
+        (
+            np.concatenate([at_i, at_j]),
+            (np.concatenate([rows, rows]), np.concatenate([i, j])),
+        ),
+        shape=(len(i), n),
+    )
+    stay = np.where(topology.border, _FIRM, position_weight) ** 2
+    system = slopes.T @ slopes + sparse.diags(stay)
+    near = np.where(topology.border, 0.0, along_mm)
+    return CholeskyFactor(system).solve(slopes.T @ right + stay * near)

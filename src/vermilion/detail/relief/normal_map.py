@@ -1,0 +1,50 @@
+"""Tangent-space normal maps: the refined mesh against the smooth one, in the model's texture space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.geometry.mesh import incidence, normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
+
+
+class NormalMap:
+    """Maps of one take: the places of the pixels on the mesh are found once."""
+
+    def __init__(self, topology: FineTopology, uv: np.ndarray, size_px: int):
+        """`uv` (V, 2) of the coarse mesh, v upwards; maps are (size_px, size_px)."""
+        self.uv, self._triangles = topology.finer @ uv.astype(np.float64), topology.triangles
+        middle = (np.arange(size_px) + 0.5) / size_px
+        u, v = np.meshgrid(middle, 1 - middle)
+        rays = np.stack([u, v, np.ones_like(u)], axis=2)
+        # Regions other than skin may lie over it in texture space: only the skin is cast.
+        skin = self._triangles[topology.skin_of]
+        flat = np.concatenate([self.uv, np.zeros((len(self.uv), 1))], axis=1)
+        caster = RayCaster(flat, skin)
+        self._hits = caster.cast(rays, np.broadcast_to([0.0, 0.0, -1.0], rays.shape))
+        self._skin = skin
+
+    def draw(self, smooth_mm: np.ndarray, refined_mm: np.ndarray) -> np.ndarray:
+        """(size_px, size_px, 3) in [0, 1]: 0.5 + 0.5 n, n in (along u, along v, outwards).
+
+        Args:
+            smooth_mm, refined_mm: (V', 3) fine meshes. Off the skin the map is flat.
+        """
+        smooth = vertex_normals(smooth_mm, self._triangles)
+        shaped = vertex_normals(refined_mm, self._triangles)
+        first = self._along_u(smooth_mm, smooth)
+        basis = np.stack([first, np.cross(smooth, first), smooth], axis=1)
+        local = np.einsum("vij,vj->vi", basis, shaped)
+        found = normalised(interpolate(self._hits, self._skin, local))
+        return np.where(self._hits.hit[..., None], 0.5 + 0.5 * found, [0.5, 0.5, 1.0])
+
+    def _along_u(self, vertices_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(V', 3) unit tangents in which u grows."""
+        corners, uv = vertices_mm[self._triangles], self.uv[self._triangles]
+        one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        grows = (one * b[:, 1:] - two * a[:, 1:]) * np.sign(area)[:, None]
+        total = incidence(self._triangles, len(vertices_mm)) @ grows
+        return normalised(total - (total * normals).sum(axis=1, keepdims=True) * normals)

@@ -1,0 +1,131 @@
+"""Relief of one frame: displacements along the normals whose shading explains the picture's detail."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from vermilion.detail.relief.light import ClipLight
+from vermilion.detail.relief.short_range import DetailFilter
+from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.geometry.mesh import triangle_areas, triangle_cross, vertex_areas, vertex_normals
+from vermilion.geometry.sparse import CholeskyFactor
+
+_PATCH_MM2 = 4.0  # patches of this area bend independently of one another
+_SAMPLE_MM2 = 1.0  # smaller triangles are not independent measurements
+_FIRM = 1e4
+_ROBUST_SIGMAS = 2.5
+
+
+@dataclass(frozen=True)
+class ReliefSettings:
+    """What relief is believed.
+
+    Attributes:
+        detail_mm: shading that changes over longer ranges is left to light, albedo and coarse mesh.
+        curvature_sigma: typical mean curvature of the displacement, 1 / mm.
+        displacement_sigma_mm: typical displacement.
+        noise_floor: least deviation of a value (0 to 255), where the first frames show less.
+        misplaced_mm: typical error of a place on the skin: edges of paint are trusted less.
+        iterations: of Gauss-Newton.
+    """
+
+    detail_mm: float = 8.0
+    curvature_sigma: float = 0.03
+    displacement_sigma_mm: float = 0.3
+    noise_floor: float = 1.0
+    misplaced_mm: float = 0.5
+    iterations: int = 2
+
+
+def solve_relief(
+    skin_mm: np.ndarray,
+    world_to_camera: np.ndarray,
+    sight: Sight,
+    light: ClipLight,
+    topology: FineTopology,
+    settings: ReliefSettings,
+) -> np.ndarray:
+    """Displacements (S,) in mm of the skin (S, 3); `world_to_camera` is (3, 3).
+
+    Gauss-Newton on what is left of the values once all that changes slowly is taken away (so that
+    shading gradients agree, Mono13 8, without the noise that differences of neighbours amplify),
+    with Cauchy weights, each value by its own deviation; on the mean curvature of the displacements;
+    on their size. The skin's border stays.
+    """
+    normals = vertex_normals(skin_mm, topology.skin)
+    n, q = len(skin_mm), len(topology.skin)
+    trust = sight.trust * (light.seen > 0)
+    if not trust.any():
+        return np.zeros(n)
+    centres = skin_mm[topology.skin].mean(axis=1)
+    detail = DetailFilter(topology.pairs, centres, trust, settings.detail_mm)
+    sigma = deviation(light, sight, topology, centres, settings)
+    stiff = _regulariser(skin_mm, topology, settings)
+    areas = triangle_areas(skin_mm, topology.skin)
+    worth = trust * np.minimum(areas / _SAMPLE_MM2, 1.0)
+    along, scale = np.zeros(n), None
+    for _ in range(settings.iterations):
+        points = skin_mm + along[:, None] * normals
+        cross = triangle_cross(points, topology.skin)
+        length = np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
+        facing = cross / length
+        inner = facing @ world_to_camera.T
+        error = detail((sight.colours - light.values(inner)).mean(axis=1))
+        if scale is None:
+            # Relief is rare: what is off everywhere is a mesh that lies badly on the picture.
+            scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
+            sigma = sigma * scale
+        slope = light.slopes(inner) @ world_to_camera
+        # The hat function of corner k has the gradient facing x (opposite edge) / (2 area).
+        corners = points[topology.skin]
+        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+        hats = np.cross(facing[:, None], opposite) / length[:, None]
+        lift = np.einsum("qk,qck->qc", facing, normals[topology.skin])
+        change = -np.einsum("qk,qck->qc", slope, hats) * lift
+        jacobian = sparse.csr_matrix(
+            (change.ravel(), (np.repeat(np.arange(q), 3), topology.skin.ravel())), shape=(q, n)
+        )
+        weight = worth / (sigma**2 + (error / _ROBUST_SIGMAS) ** 2)
+        weighted = jacobian.T @ sparse.diags(weight)
+        right = weighted @ error - stiff @ along
+        along = along + CholeskyFactor((weighted @ jacobian + stiff).tocsc()).solve(right)
+    return along
+
+
+def deviation(
+    light: ClipLight,
+    sight: Sight,
+    topology: FineTopology,
+    centres_mm: np.ndarray,
+    settings: ReliefSettings,
+) -> np.ndarray:
+    """Typical error (Q,) of the triangles' values: the clip's noise, and paint that is misplaced."""
+    shown = light.values(sight.normals).mean(axis=1)
+    i, j = topology.pairs.T
+    apart = np.maximum(np.linalg.norm(centres_mm[i] - centres_mm[j], axis=1), 0.2)
+    steep = ((shown[i] - shown[j]) / apart) ** 2
+    count = np.bincount(topology.pairs.ravel(), minlength=len(shown))
+    total = np.bincount(topology.pairs.ravel(), np.repeat(steep, 2), minlength=len(shown))
+    noise = np.maximum(light.noise, settings.noise_floor)
+    return np.sqrt(noise**2 + settings.misplaced_mm**2 * total / np.maximum(count, 1))
+
+
+def _regulariser(skin_mm, topology, settings) -> sparse.csc_matrix:
+    """(S, S): smoothness and size of the displacements, alike for any size of triangles."""
+    n, edges = len(skin_mm), topology.edges
+    squared = ((skin_mm[edges[:, 0]] - skin_mm[edges[:, 1]]) ** 2).sum(axis=1)
+    graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
+    graph = graph + graph.T
+    degree = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)
+    total = np.bincount(edges.ravel(), np.repeat(squared, 2), minlength=n)
+    mean_squared = np.maximum(total / degree, 1e-6)
+    # Of a function of constant curvature the mean over a ring differs by curvature x length^2 / 4.
+    bend = sparse.diags(4 / mean_squared) @ (sparse.diags(1 / degree) @ graph - sparse.identity(n))
+    patches = vertex_areas(skin_mm, topology.skin) / _PATCH_MM2
+    bending = bend.T @ sparse.diags(patches / settings.curvature_sigma**2) @ bend
+    stay = np.where(topology.border, _FIRM, patches + 1e-6) / settings.displacement_sigma_mm**2
+    return (bending + sparse.diags(stay)).tocsc()

@@ -1,0 +1,38 @@
+"""What of the triangles' values changes over short ranges."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from vermilion.geometry.sparse import CholeskyFactor
+
+
+def graph_laplacian(pairs: np.ndarray, centres_mm: np.ndarray, length_mm: float):
+    """(Q, Q) of neighbouring triangles (P, 2), weighted so that smoothing reaches `length_mm`."""
+    n = len(centres_mm)
+    apart = np.linalg.norm(centres_mm[pairs[:, 0]] - centres_mm[pairs[:, 1]], axis=1)
+    weight = (length_mm / np.maximum(apart, 1e-3)) ** 2
+    weight = np.minimum(weight, 100 * np.median(weight)) if len(weight) else weight
+    graph = sparse.csr_matrix((weight, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    graph = graph + graph.T
+    return sparse.diags(np.asarray(graph.sum(axis=1)).ravel()) - graph
+
+
+class DetailFilter:
+    """Values less their smooth part, which is drawn to them by trust and to its neighbours."""
+
+    def __init__(self, pairs, centres_mm, trust, length_mm: float):
+        """`pairs` (P, 2) triangles that share an edge; `centres_mm` (Q, 3); `trust` (Q,) >= 0."""
+        self._trust = trust / max(trust.max(), 1e-9) + 1e-3
+        laplacian = graph_laplacian(pairs, centres_mm, length_mm)
+        self._factor = CholeskyFactor(laplacian + sparse.diags(self._trust))
+
+    def smooth(self, values: np.ndarray) -> np.ndarray:
+        """The smooth part of values (Q,) or (Q, C)."""
+        trust = self._trust.reshape(-1, *[1] * (values.ndim - 1))
+        return self._factor.solve(trust * values)
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """What is left of values (Q,) or (Q, C)."""
+        return values - self.smooth(values)

@@ -1,0 +1,82 @@
+"""The subdivided mesh of a take and the part of it whose shading is read: the skin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from vermilion.appearance.samples import skin
+from vermilion.detail.relief.subdivision import loop_subdivision
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.mesh import boundary_edges, submesh, unique_edges
+
+_BORDER_RINGS = 3
+
+
+@dataclass(frozen=True)
+class FineTopology:
+    """Fixed for a take; indices of the skin count its own vertices.
+
+    Attributes:
+        finer: (V', V) coarse to fine vertices.
+        triangles: (T', 3) of the whole fine mesh.
+        skin_ids: (S,) fine vertices of the skin.
+        skin: (Q, 3) triangles of the skin, in numbers of `skin_ids`.
+        skin_of: (Q,) the same triangles in `triangles`.
+        pairs: (P, 2) triangles of the skin that share an edge.
+        edges: (E, 2) edges of the skin.
+        beside: (S,) a fixed neighbour of each vertex, the direction of its first tangent.
+        border: (S,) bool, where the skin ends.
+    """
+
+    finer: sparse.csr_matrix
+    triangles: np.ndarray
+    skin_ids: np.ndarray
+    skin: np.ndarray
+    skin_of: np.ndarray
+    pairs: np.ndarray
+    edges: np.ndarray
+    beside: np.ndarray
+    border: np.ndarray
+
+    @classmethod
+    def of(cls, model: FaceModel, levels: int) -> FineTopology:
+        """Of a face model: its skin without eyes, mouth and the rim of the mesh."""
+        finer, triangles = loop_subdivision(model.triangles, model.n_vertices, levels)
+        keep = finer @ skin(model, _BORDER_RINGS).astype(float) > 0.999
+        return cls.of_mask(finer, triangles, keep)
+
+    @classmethod
+    def of_mask(cls, finer: sparse.csr_matrix, triangles: np.ndarray, keep: np.ndarray):
+        """With `keep` (V',) bool as the skin."""
+        ids, own = submesh(triangles, keep)
+        edges = unique_edges(own)
+        beside = np.zeros(len(ids), dtype=int)
+        beside[edges[:, 1]] = edges[:, 0]
+        beside[edges[:, 0]] = edges[:, 1]
+        border = np.zeros(len(ids), dtype=bool)
+        border[boundary_edges(own)] = True
+        skin_of = np.flatnonzero(keep[triangles].all(axis=1))
+        return cls(finer, triangles, ids, own, skin_of, _pairs(own), edges, beside, border)
+
+    def refine(self, coarse_mm: np.ndarray) -> np.ndarray:
+        """Smooth fine mesh (V', 3) of a coarse one (V, 3)."""
+        return self.finer @ np.asarray(coarse_mm, dtype=np.float64)
+
+    def displaced(self, fine_mm: np.ndarray, normals: np.ndarray, along_mm: np.ndarray):
+        """Fine mesh (V', 3) whose skin is moved by (S,) along its normals (S, 3)."""
+        moved = fine_mm.copy()
+        moved[self.skin_ids] += along_mm[:, None] * normals
+        return moved
+
+
+def _pairs(triangles: np.ndarray) -> np.ndarray:
+    """(P, 2) triangles on both sides of each inner edge."""
+    corners = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    corners = np.sort(corners, axis=1)
+    order = np.lexsort((corners[:, 1], corners[:, 0]))
+    same = (corners[order][1:] == corners[order][:-1]).all(axis=1)
+    of = order % len(triangles)
+    return np.stack([of[:-1][same], of[1:][same]], axis=1)

@@ -1,0 +1,1 @@
+"""Meshes, points on surfaces, alignment, rotations, registration, rays, sparse factors, cameras."""

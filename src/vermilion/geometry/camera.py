@@ -1,0 +1,232 @@
+"""Cameras as COLMAP has them, read and written through pycolmap."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pycolmap
+
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_folder
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A calibrated camera.
+
+    x right, y down, z forward; the centre of the top-left pixel is (0.5, 0.5). World and camera
+    frames are in millimetres.
+
+    Attributes:
+        name: the camera's name (its folder under `frames/`).
+        model: COLMAP model name (`PINHOLE`, `OPENCV`, ...).
+        params: the model's parameters, pixels first.
+        width_px, height_px: image size.
+        cam_from_world: (3, 4) [R | t].
+    """
+
+    name: str
+    model: str
+    params: tuple[float, ...]
+    width_px: int
+    height_px: int
+    cam_from_world: np.ndarray
+
+    @property
+    def rotation(self) -> np.ndarray:
+        return self.cam_from_world[:, :3]
+
+    @property
+    def translation(self) -> np.ndarray:
+        return self.cam_from_world[:, 3]
+
+    @property
+    def centre_mm(self) -> np.ndarray:
+        """Projection centre in the world, (3,)."""
+        return -self.rotation.T @ self.translation
+
+    @property
+    def is_pinhole(self) -> bool:
+        return self.model in ("PINHOLE", "SIMPLE_PINHOLE")
+
+    def colmap(self) -> pycolmap.Camera:
+        return pycolmap.Camera(
+            model=self.model, width=self.width_px, height=self.height_px, params=list(self.params)
+        )
+
+    @property
+    def calibration(self) -> np.ndarray:
+        """(3, 3) matrix K of the undistorted camera."""
+        return np.asarray(self.colmap().calibration_matrix())
+
+    def to_camera(self, points_mm: np.ndarray) -> np.ndarray:
+        """World points (..., 3) in the camera frame, (..., 3) mm."""
+        return points_mm @ self.rotation.T + self.translation
+
+    def project(self, points_mm: np.ndarray) -> np.ndarray:
+        """World points (..., 3) mm to pixels (..., 2). Points behind the camera become NaN."""
+        local = self.to_camera(np.asarray(points_mm, dtype=np.float64))
+        depth = local[..., 2:3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            normal = np.where(depth > 1e-9, local[..., :2] / depth, np.nan)
+        if self.is_pinhole:
+            k = self.calibration
+            return normal * [k[0, 0], k[1, 1]] + [k[0, 2], k[1, 2]]
+        flat = local.reshape(-1, 3)
+        pixels = np.asarray(self.colmap().img_from_cam(flat)).reshape(*local.shape[:-1], 2)
+        return np.where(depth > 1e-9, pixels, np.nan)
+
+    def pixel_jacobian(self, points_mm: np.ndarray, step_mm: float = 0.05) -> np.ndarray:
+        """Change of the pixel by the world point, (..., 2, 3) px/mm, at points (..., 3).
+
+        Exact for a pinhole; by central differences of `step_mm` for other lenses.
+        """
+        points_mm = np.asarray(points_mm, dtype=np.float64)
+        if not self.is_pinhole:
+            moves = step_mm * np.eye(3)
+            slopes = [self.project(points_mm + m) - self.project(points_mm - m) for m in moves]
+            return np.stack(slopes, axis=-1) / (2 * step_mm)
+        k, local = self.calibration, self.to_camera(points_mm)
+        x, y, z = np.moveaxis(local, -1, 0)
+        inner = np.zeros((*local.shape[:-1], 2, 3))
+        inner[..., 0, 0], inner[..., 1, 1] = k[0, 0] / z, k[1, 1] / z
+        inner[..., 0, 2], inner[..., 1, 2] = -k[0, 0] * x / z**2, -k[1, 1] * y / z**2
+        return inner @ self.rotation
+
+    def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origins and unit directions in the world of pixels (..., 2), both (..., 3)."""
+        pixels = np.asarray(pixels, dtype=np.float64)
+        if self.is_pinhole:
+            k = self.calibration
+            normal = (pixels - [k[0, 2], k[1, 2]]) / [k[0, 0], k[1, 1]]
+        else:
+            flat = np.asarray(self.colmap().cam_from_img(pixels.reshape(-1, 2)))
+            normal = flat[:, :2].reshape(pixels.shape)
+        local = np.concatenate([normal, np.ones((*normal.shape[:-1], 1))], axis=-1)
+        directions = local @ self.rotation
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        return np.broadcast_to(self.centre_mm, directions.shape), directions
+
+    def pixel_grid(self) -> np.ndarray:
+        """Centres of all pixels, (height, width, 2)."""
+        x, y = np.meshgrid(np.arange(self.width_px) + 0.5, np.arange(self.height_px) + 0.5)
+        return np.stack([x, y], axis=-1)
+
+    def in_image(self, pixels: np.ndarray, margin_px: float = 0.0) -> np.ndarray:
+        """Which pixels (..., 2) lie in the picture, at least `margin_px` from its border."""
+        x, y = pixels[..., 0], pixels[..., 1]
+        with np.errstate(invalid="ignore"):
+            return (
+                (x >= margin_px)
+                & (y >= margin_px)
+                & (x <= self.width_px - margin_px)
+                & (y <= self.height_px - margin_px)
+            )
+
+    def resized(self, scale: float) -> Camera:
+        """The camera of the image resized by `scale` (sizes rounded)."""
+        camera = self.colmap()
+        camera.rescale(round(self.width_px * scale), round(self.height_px * scale))
+        return replace(
+            self,
+            params=tuple(camera.params),
+            width_px=camera.width,
+            height_px=camera.height,
+        )
+
+
+def pinhole(
+    name: str,
+    focal_px: float,
+    width_px: int,
+    height_px: int,
+    cam_from_world: np.ndarray | None = None,
+) -> Camera:
+    """A pinhole camera with its principal point in the middle; at the world's origin by default."""
+    if cam_from_world is None:
+        cam_from_world = np.eye(3, 4)
+    params = (float(focal_px), float(focal_px), width_px / 2, height_px / 2)
+    return Camera(name, "PINHOLE", params, width_px, height_px, np.asarray(cam_from_world, float))
+
+
+def look_at(centre_mm: np.ndarray, target_mm: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """`cam_from_world` (3, 4) of a camera at `centre_mm` that looks at `target_mm`; `up` is up."""
+    forward = np.asarray(target_mm, float) - centre_mm
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return np.concatenate([rotation, (-rotation @ centre_mm)[:, None]], axis=1)
+
+
+def read_cameras(folder: str | Path) -> dict[str, Camera]:
+    """Cameras of a COLMAP text model, by image name without suffix, sorted by name.
+
+    Raises InputError where the folder is no such model.
+    """
+    folder = Path(folder)
+    for name in ("cameras.txt", "images.txt"):
+        if not (folder / name).is_file():
+            raise InputError(
+                f"no {name}",
+                "a COLMAP text model (cameras.txt, images.txt)",
+                "Export the rig as text from COLMAP, or give calibration views.",
+                path=folder,
+            )
+    try:
+        model = pycolmap.Reconstruction()
+        model.read_text(str(folder)) if (folder / "points3D.txt").is_file() else _read_two(
+            model, folder
+        )
+    except Exception as error:  # pycolmap raises several kinds
+        raise InputError(
+            f"a COLMAP model that cannot be read ({error})",
+            "valid cameras.txt and images.txt",
+            "Check the files' columns against the COLMAP documentation.",
+            path=folder,
+        ) from error
+    cameras = {}
+    for image in model.images.values():
+        name = Path(image.name).stem
+        camera = model.cameras[image.camera_id]
+        pose = np.asarray(image.cam_from_world().matrix())
+        cameras[name] = Camera(
+            name, camera.model_name, tuple(camera.params), camera.width, camera.height, pose
+        )
+    if not cameras:
+        raise InputError(
+            "no image in images.txt", "one image a camera", "Add a pose a camera.", path=folder
+        )
+    return dict(sorted(cameras.items()))
+
+
+def _read_two(model: pycolmap.Reconstruction, folder: Path) -> None:
+    """Read a model whose points3D.txt is absent, as exporters leave it out."""
+    with tempfile.TemporaryDirectory() as copy:
+        for name in ("cameras.txt", "images.txt"):
+            shutil.copy(folder / name, copy)
+        (Path(copy) / "points3D.txt").touch()
+        model.read_text(copy)
+
+
+def write_cameras(folder: str | Path, cameras: dict[str, Camera]) -> None:
+    """Write a COLMAP text model (one image a camera, named after it), whole or not at all."""
+    lines, poses = (
+        ["# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]"],
+        ["# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME (cam_from_world, millimetres)"],
+    )
+    for index, (name, camera) in enumerate(sorted(cameras.items()), start=1):
+        params = " ".join(repr(float(p)) for p in camera.params)
+        lines.append(f"{index} {camera.model} {camera.width_px} {camera.height_px} {params}")
+        pose = pycolmap.Rigid3d(camera.cam_from_world)
+        x, y, z, w = pose.rotation.quat
+        numbers = " ".join(repr(float(v)) for v in (w, x, y, z, *pose.translation))
+        poses += [f"{index} {numbers} {index} {name}", ""]
+    with atomic_folder(folder) as temporary:
+        (temporary / "cameras.txt").write_text("\n".join(lines) + "\n")
+        (temporary / "images.txt").write_text("\n".join(poses) + "\n")
+        (temporary / "points3D.txt").write_text("")

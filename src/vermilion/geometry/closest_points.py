@@ -1,0 +1,186 @@
+"""Nearest points of a triangle mesh, with conditions on the triangles that may be chosen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy.spatial import cKDTree
+
+from vermilion.geometry.mesh import triangle_areas, triangle_normals
+
+_FIRST_CANDIDATES = 2
+_CONDITIONAL_CANDIDATES = 48
+_SIZE_QUANTILES = (0.25, 0.5, 0.75, 0.9, 0.98)
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on a mesh.
+
+    Attributes:
+        triangle: (N,) int64, -1 where no triangle fulfils the conditions.
+        barycentric: (N, 3) float64.
+        distance_mm: (N,) float64 to the query, infinite where there is none.
+    """
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    distance_mm: np.ndarray
+
+    @property
+    def found(self) -> np.ndarray:
+        return self.triangle >= 0
+
+    def on(self, vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """The points on other vertices (..., V, 3) of the same topology, (..., N, 3); NaN if none."""
+        corners = vertices_mm[..., triangles[np.maximum(self.triangle, 0)], :]
+        points = np.einsum("nk,...nkd->...nd", self.barycentric, corners)
+        points[..., ~self.found, :] = np.nan
+        return points
+
+
+class Surface:
+    """A mesh prepared for nearest-point queries; exact, by candidates of a k-d tree.
+
+    Triangles without area are left out.
+    """
+
+    def __init__(self, vertices_mm: np.ndarray, triangles: np.ndarray):
+        vertices = np.asarray(vertices_mm, dtype=np.float64)
+        kept = np.flatnonzero(triangle_areas(vertices, triangles) > 1e-9)
+        self.ids = kept
+        self.corners = np.ascontiguousarray(vertices[triangles[kept]])
+        self.normals = triangle_normals(vertices, triangles[kept])
+        centroids = self.corners.mean(axis=1)
+        radii = np.linalg.norm(self.corners - centroids[:, None], axis=2).max(axis=1)
+        # Candidates are searched for among triangles of like size: one large triangle in a tree of
+        # small ones would make every candidate list long.
+        order = np.argsort(radii, kind="stable")
+        bounds = np.searchsorted(radii[order], np.quantile(radii, _SIZE_QUANTILES), side="right")
+        self._groups = []
+        for members in np.split(order, np.unique(bounds)):
+            if len(members):
+                self._groups.append((members, cKDTree(centroids[members]), radii[members].max()))
+
+    def closest(
+        self,
+        points_mm: np.ndarray,
+        normals: np.ndarray | None = None,
+        min_cosine: float = 0.5,
+        labels: np.ndarray | None = None,
+        triangle_labels: np.ndarray | None = None,
+    ) -> SurfacePoints:
+        """Nearest point of the mesh to each of `points_mm` (N, 3).
+
+        With `normals` (N, 3), only triangles whose normal makes a cosine of at least `min_cosine`
+        count. With `labels` (N,) and `triangle_labels` (T,) of all triangles, only triangles with an
+        equal label count; label 0 goes with every label. Conditions are met among the 48 nearest
+        triangles of each size or not at all.
+        """
+        points = np.ascontiguousarray(points_mm, dtype=np.float64)
+        conditional = normals is not None or labels is not None
+        given = np.zeros((len(points), 3)) if normals is None else np.asarray(normals, float)
+        cosine = -2.0 if normals is None else min_cosine
+        wanted = np.zeros(len(points), np.int64) if labels is None else np.asarray(labels, np.int64)
+        owned = np.zeros(len(self.ids), np.int64)
+        if triangle_labels is not None:
+            owned = np.asarray(triangle_labels, np.int64)[self.ids]
+        best = np.full(len(points), np.inf)
+        triangle = np.full(len(points), -1, np.int64)
+        barycentric = np.zeros((len(points), 3))
+
+        def search(group: tuple, rows: np.ndarray, k: int) -> np.ndarray:
+            """Try the k candidates of each row; returns the distance to the farthest centroid."""
+            members, tree, _ = group
+            far, near = tree.query(points[rows], k=k)
+            near = members[near.reshape(len(rows), k)]
+            _closest_of(
+                points, given, wanted, rows, near, self.corners, self.normals, owned,
+                cosine, best, triangle, barycentric,
+            )  # fmt: skip
+            return far.reshape(len(rows), k)[:, -1]
+
+        # First a good bound from few candidates of every size, then what could be nearer still.
+        everything = np.arange(len(points))
+        start = [
+            min(_CONDITIONAL_CANDIDATES if conditional else _FIRST_CANDIDATES, len(group[0]))
+            for group in self._groups
+        ]
+        reached = [search(g, everything, k) for g, k in zip(self._groups, start, strict=True)]
+        for group, k, far in zip(self._groups, start, reached, strict=True):
+            rows = everything
+            while not conditional and k < len(group[0]):
+                open_rows = far < best[rows] + group[2]
+                rows = rows[open_rows]
+                if not len(rows):
+                    break
+                k = min(3 * k, len(group[0]))
+                far = search(group, rows, k)
+        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
+        return SurfacePoints(triangle, barycentric, best)
+
+
+@numba.njit(cache=True)
+def _closest_of(  # pragma: no cover - compiled
+    points, normals, labels, rows, candidates, corners, face_normals, face_labels,
+    min_cosine, best, triangle, barycentric,
+):  # fmt: skip
+    """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
+    for index in range(len(rows)):
+        row = rows[index]
+        px, py, pz = points[row]
+        nx, ny, nz = normals[row]
+        least = best[row] ** 2
+        for t in candidates[index]:
+            if labels[row] != 0 and face_labels[t] != 0 and labels[row] != face_labels[t]:
+                continue
+            if min_cosine > -1.0:
+                fx, fy, fz = face_normals[t]
+                if nx * fx + ny * fy + nz * fz < min_cosine:
+                    continue
+            u, v, w = _project(px, py, pz, corners[t])
+            dx = u * corners[t, 0, 0] + v * corners[t, 1, 0] + w * corners[t, 2, 0] - px
+            dy = u * corners[t, 0, 1] + v * corners[t, 1, 1] + w * corners[t, 2, 1] - py
+            dz = u * corners[t, 0, 2] + v * corners[t, 1, 2] + w * corners[t, 2, 2] - pz
+            square = dx * dx + dy * dy + dz * dz
+            if square < least:
+                least = square
+                best[row] = math.sqrt(square)
+                triangle[row] = t
+                barycentric[row, 0], barycentric[row, 1], barycentric[row, 2] = u, v, w
+
+
+@numba.njit(cache=True, inline="always")
+def _project(px, py, pz, abc):  # pragma: no cover - compiled
+    """Barycentric weights of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
+    abx, aby, abz = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
+    acx, acy, acz = abc[2, 0] - abc[0, 0], abc[2, 1] - abc[0, 1], abc[2, 2] - abc[0, 2]
+    apx, apy, apz = px - abc[0, 0], py - abc[0, 1], pz - abc[0, 2]
+    d1, d2 = abx * apx + aby * apy + abz * apz, acx * apx + acy * apy + acz * apz
+    if d1 <= 0 and d2 <= 0:
+        return 1.0, 0.0, 0.0
+    bpx, bpy, bpz = px - abc[1, 0], py - abc[1, 1], pz - abc[1, 2]
+    d3, d4 = abx * bpx + aby * bpy + abz * bpz, acx * bpx + acy * bpy + acz * bpz
+    if d3 >= 0 and d4 <= d3:
+        return 0.0, 1.0, 0.0
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0 and d1 >= 0 and d3 <= 0:
+        v = d1 / (d1 - d3)
+        return 1.0 - v, v, 0.0
+    cpx, cpy, cpz = px - abc[2, 0], py - abc[2, 1], pz - abc[2, 2]
+    d5, d6 = abx * cpx + aby * cpy + abz * cpz, acx * cpx + acy * cpy + acz * cpz
+    if d6 >= 0 and d5 <= d6:
+        return 0.0, 0.0, 1.0
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0 and d2 >= 0 and d6 <= 0:
+        w = d2 / (d2 - d6)
+        return 1.0 - w, 0.0, w
+    va = d3 * d6 - d5 * d4
+    if va <= 0 and d4 - d3 >= 0 and d5 - d6 >= 0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        return 0.0, 1.0 - w, w
+    total = va + vb + vc
+    return va / total, vb / total, vc / total

@@ -1,0 +1,124 @@
+"""Overlays: meshes, points and polylines over pictures (sRGB, 8 bit)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import matplotlib
+import numpy as np
+
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.raycast import Hits, RayCaster, interpolate
+from vermilion.imaging.images import linear_to_srgb
+
+_SHIFT = 4  # sub-pixel bits of OpenCV's drawing
+
+
+def to_display(linear: np.ndarray) -> np.ndarray:
+    """Linear RGB (h, w, 3) as sRGB uint8."""
+    return np.rint(linear_to_srgb(linear) * 255).astype(np.uint8)
+
+
+def draw_points(
+    picture: np.ndarray, points_px: np.ndarray, colour: Sequence[int], radius_px: int = 2
+) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with discs at (N, 2) pixels; NaN is left out."""
+    picture = np.ascontiguousarray(picture).copy()
+    for x, y in _fixed(points_px):
+        cv2.circle(picture, (x, y), radius_px << _SHIFT, tuple(colour), -1, cv2.LINE_AA, _SHIFT)
+    return picture
+
+
+def draw_polyline(
+    picture: np.ndarray,
+    points_px: np.ndarray,
+    colour: Sequence[int],
+    closed: bool = True,
+    width_px: int = 1,
+) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with a polyline through (N, 2) pixels; NaN is left out."""
+    picture = np.ascontiguousarray(picture).copy()
+    points = _fixed(points_px).reshape(-1, 1, 2)
+    if len(points):
+        cv2.polylines(picture, [points], closed, tuple(colour), width_px, cv2.LINE_AA, _SHIFT)
+    return picture
+
+
+def draw_mesh(
+    picture: np.ndarray,
+    camera: Camera,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    colours: np.ndarray | None = None,
+    opacity: float = 1.0,
+) -> np.ndarray:
+    """A shaded mesh over (h, w, 3) uint8, seen from `camera` with a headlight.
+
+    `colours` (V, 3) in [0, 1]; light grey by default.
+    """
+    hits = RayCaster(vertices_mm, triangles).see(camera)
+    return paint_mesh(picture, camera, hits, vertices_mm, triangles, colours, opacity)
+
+
+def paint_mesh(
+    picture: np.ndarray,
+    camera: Camera,
+    hits: Hits,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    colours: np.ndarray | None = None,
+    opacity: float = 1.0,
+) -> np.ndarray:
+    """`draw_mesh` with what the camera sees of the mesh already known."""
+    normals = interpolate(hits, triangles, vertex_normals(vertices_mm, triangles))
+    _, directions = camera.rays(camera.pixel_grid())
+    facing = np.abs((normals * directions).sum(axis=-1))
+    if colours is None:
+        colours = np.full((len(vertices_mm), 3), 0.8)
+    albedo = interpolate(hits, triangles, np.asarray(colours, dtype=np.float64))
+    shaded = np.clip(albedo * (0.25 + 0.75 * facing)[..., None], 0, 1) * 255
+    mask = hits.hit[..., None] * opacity
+    return np.rint(picture * (1 - mask) + shaded * mask).astype(np.uint8)
+
+
+def colour_map(values: np.ndarray, low: float, high: float, name: str = "turbo") -> np.ndarray:
+    """Values (...,) as RGB (..., 3) in [0, 1]; NaN is grey."""
+    scaled = (np.asarray(values, dtype=float) - low) / (high - low)
+    rgb = matplotlib.colormaps[name](np.clip(np.nan_to_num(scaled), 0, 1))[..., :3]
+    return np.where(np.isnan(scaled)[..., None], 0.5, rgb)
+
+
+def label(picture: np.ndarray, text: str) -> np.ndarray:
+    """A copy of (h, w, 3) uint8 with a line of text in its top left corner."""
+    picture = np.ascontiguousarray(picture).copy()
+    size = max(0.4, picture.shape[1] / 1200)
+    place = (6, round(24 * size) + 4)
+    for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        cv2.putText(
+            picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA
+        )
+    return picture
+
+
+def tile(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
+    """Pictures (h, w, 3) uint8 of any sizes side by side, all scaled to the first one's height."""
+    height = pictures[0].shape[0]
+    scaled = [
+        p
+        if p.shape[0] == height
+        else cv2.resize(p, (round(p.shape[1] * height / p.shape[0]), height))
+        for p in pictures
+    ]
+    rows = [np.hstack(scaled[i : i + columns]) for i in range(0, len(scaled), columns)]
+    width = max(row.shape[1] for row in rows)
+    rows = [np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in rows]
+    return np.vstack(rows)
+
+
+def _fixed(points_px: np.ndarray) -> np.ndarray:
+    """Finite pixels as OpenCV's fixed-point integers; its pixel centres are whole numbers."""
+    points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
+    points = points[np.isfinite(points).all(axis=1)]
+    return np.rint((points - 0.5) * (1 << _SHIFT)).astype(np.int32)

@@ -1,0 +1,136 @@
+"""One way to read a take's pictures, wherever they lie: capture folder, frame folder or video."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from vermilion.imaging.images import IMAGE_SUFFIXES, image_size, read_image, srgb_to_linear
+from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.storage.errors import InputError
+
+
+class FrameSource(Protocol):
+    """The pictures of a take."""
+
+    def read(self, camera: str, frame: int) -> np.ndarray:
+        """Linear RGB, (h, w, 3) float32. Raises InputError naming the place."""
+
+    def size(self, camera: str) -> tuple[int, int]:
+        """(width, height) of a camera's pictures."""
+
+
+class FolderFrames:
+    """`<folder>/<frame>.<suffix>`, in one folder or several chunks; the camera is ignored."""
+
+    def __init__(self, folders: Sequence[str | Path], subject: str = "", take: str = ""):
+        self.subject, self.take = subject, take
+        self._paths: dict[int, Path] = {}
+        self.folders = [Path(folder) for folder in folders]
+        for folder in self.folders:
+            self._paths.update(list_frames(folder))
+
+    def read(self, camera: str, frame: int) -> np.ndarray:
+        place = {"subject": self.subject, "take": self.take, "camera": camera, "frame": frame}
+        if frame not in self._paths:
+            raise InputError(
+                "no image of this frame",
+                f"a file such as {frame:06d}.png",
+                "Check the frame range of the take sheet, or export the frame.",
+                path=self.folders[0],
+                **place,
+            )
+        return read_image(self._paths[frame], **place)
+
+    def size(self, camera: str) -> tuple[int, int]:
+        if not self._paths:
+            raise InputError(
+                "no images", "numbered images", "Check the folder.", path=self.folders[0]
+            )
+        return image_size(self._paths[min(self._paths)], camera=camera)
+
+
+class CaptureFrames:
+    """`<capture>/frames/<camera>/<frame>.<suffix>`."""
+
+    def __init__(self, capture: str | Path, subject: str = "", take: str = ""):
+        self.capture, self.subject, self.take = Path(capture), subject, take
+        self._cameras: dict[str, FolderFrames] = {}
+
+    def _camera(self, camera: str) -> FolderFrames:
+        if camera not in self._cameras:
+            folder = self.capture / "frames" / camera
+            if not folder.is_dir():
+                raise InputError(
+                    "no such folder",
+                    "a folder of frames a camera",
+                    "Add the camera's frames or remove it from the rig.",
+                    subject=self.subject,
+                    take=self.take,
+                    camera=camera,
+                    path=folder,
+                )
+            self._cameras[camera] = FolderFrames([folder], self.subject, self.take)
+        return self._cameras[camera]
+
+    def read(self, camera: str, frame: int) -> np.ndarray:
+        return self._camera(camera).read(camera, frame)
+
+    def size(self, camera: str) -> tuple[int, int]:
+        return self._camera(camera).size(camera)
+
+
+#: Linear value of each byte: a look-up costs a fifth of the curve.
+_LINEAR = srgb_to_linear(np.arange(256, dtype=np.float32) / 255.0)
+
+
+class VideoFrames:
+    """A video file: one camera, frames counted from 0 in presentation order."""
+
+    def __init__(self, path: str | Path, subject: str = "", take: str = ""):
+        self.subject, self.take = subject, take
+        self._reader = VideoReader(path)
+
+    def read(self, camera: str, frame: int) -> np.ndarray:
+        pixels = self._reader.read(frame, subject=self.subject, take=self.take, camera=camera)
+        return _LINEAR[pixels]
+
+    def size(self, camera: str) -> tuple[int, int]:
+        return self._reader.size
+
+
+def open_frames(
+    source: str | Path | Sequence[str | Path], subject: str = "", take: str = ""
+) -> FrameSource:
+    """Open a capture folder, a folder (or several) of numbered frames, or a video file."""
+    if not isinstance(source, str | Path):
+        return FolderFrames(source, subject, take)
+    path = Path(source)
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return VideoFrames(path, subject, take)
+    if (path / "frames").is_dir():
+        return CaptureFrames(path, subject, take)
+    if path.is_dir():
+        return FolderFrames([path], subject, take)
+    raise InputError(
+        "neither a folder nor a video",
+        f"a capture folder, a folder of frames, or one of {', '.join(VIDEO_SUFFIXES)}",
+        "Correct the `source` of the take sheet.",
+        subject=subject,
+        take=take,
+        path=path,
+    )
+
+
+def list_frames(folder: str | Path) -> dict[int, Path]:
+    """Frame number -> file of a folder of numbered images, in order of number."""
+    paths = {}
+    for path in sorted(Path(folder).glob("*")):
+        number = re.fullmatch(r"(?:.*[._-])?(\d+)", path.stem)
+        if number and path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith("."):
+            paths[int(number.group(1))] = path
+    return dict(sorted(paths.items()))

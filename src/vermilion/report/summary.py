@@ -1,0 +1,261 @@
+"""The summary page: every result on one HTML page that opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from vermilion.report import page, study
+from vermilion.report.how_measured import how_measured
+from vermilion.report.table1 import in_order, is_variant, place_of
+
+FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
+REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
+_STAGES = (
+    "capture", "multiview", "inpaint", "landmarks", "scan", "tracking", "refinement", "detail",
+    "contours", "features", "correspondence", "correction",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """A picture of a stage: stage, `subject/take` (or what it shows), file."""
+
+    stage: str
+    what: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the page shows.
+
+    Attributes:
+        measures, table1, kinds, flagged: tables.
+        comparisons, table2, table3, estimators: tables; configured: the estimator of the configuration.
+        table1_picture, figure16: files.
+        renders, stretch, error_maps, over_time, curve_pictures: (name, file) pairs.
+        reconstructions: (name, link) pairs, pages on H of a take.
+        overlays: pictures of the stages.
+        videos, timelines: (name, file) pairs of the corrected takes.
+        frames, regressors: tables of `how_measured`.
+        settings: (what, value) pairs for "How this was measured".
+    """
+
+    measures: pd.DataFrame
+    table1: pd.DataFrame
+    kinds: pd.DataFrame
+    flagged: pd.DataFrame
+    comparisons: pd.DataFrame
+    table2: pd.DataFrame
+    table3: pd.DataFrame
+    estimators: pd.DataFrame
+    configured: str
+    table1_picture: Path
+    figure16: Path
+    renders: Sequence[tuple[str, Path]]
+    stretch: Sequence[tuple[str, Path]]
+    error_maps: Sequence[tuple[str, Path]]
+    over_time: Sequence[tuple[str, Path]]
+    curve_pictures: Sequence[tuple[str, Path]]
+    overlays: Sequence[Overlay]
+    videos: Sequence[tuple[str, Path]]
+    timelines: Sequence[tuple[str, Path]]
+    reconstructions: Sequence[tuple[str, str]]
+    frames: pd.DataFrame
+    regressors: pd.DataFrame
+    settings: Sequence[tuple[str, str]]
+
+
+def summary_page(found: Findings, embed_video_mb: float) -> str:
+    """The page as one string of HTML with everything embedded."""
+    takes = len(found.frames)
+    total = int(found.frames["frames"].sum()) if takes else 0
+    return page.page(
+        "Lips: what was built and how accurate it is",
+        f"{takes} takes, {total} frames. Everything on this page is also a TSV file beside it.",
+        [
+            ("Key figures", _key_figures(found)),
+            ("What the comparisons say", study.answers(
+                found.comparisons, found.estimators, found.table1, found.configured)),
+            ("Table 1: tracking error", _table1(found)),
+            ("Tables 2 and 3: influence of the features", study.features(found.table2, found.table3)),
+            ("RBF network, affine map, kernel regression", study.strategies(found.estimators)
+             + page.picture(found.figure16, _FIGURE16_CAPTION)),
+            ("Corrected takes", _videos(found, embed_video_mb)),
+            ("Renders", _pictures(found.renders, _RENDER_CAPTION)),
+            ("Surface stretch", _pictures(found.stretch, _STRETCH_CAPTION)),
+            ("Error maps", _pictures(found.error_maps, _MAP_CAPTION)),
+            ("Over time", _pictures(found.over_time, "{}: held-out frames.")),
+            ("Kinds of mouth shapes", study.kinds(found.kinds)),
+            ("Further measures", _further(found.measures)),
+            ("Accuracy of H", _reconstruction(found)),
+            ("Training", _pictures(found.curve_pictures, "{}: cross-validation error.")),
+            ("Flagged frames", _flagged(found)),
+            ("Pictures of every stage", _stages(found.overlays)),
+            ("How this was measured", how_measured(found.frames, found.regressors, found.settings)),
+        ],
+    )  # fmt: skip
+
+
+_TIMELINE_CAPTION = (
+    "{}: how far each frame lies from what the regressor was trained on, and the limit over which it "
+    "is listed below as outside the training's span; grey frames were not corrected."
+)
+_RENDER_CAPTION = (
+    "{}: held-out frames with the largest error of the base track, from front and side: the picture, "
+    "every regressor, the truth (Lips16 figures 10, 12, 13)."
+)
+_STRETCH_CAPTION = (
+    "{}: surface stretch of the same frames, each against its own neutral: red is stretched, blue "
+    "compressed (Lips16 figures 9 and 11)."
+)
+_FIGURE16_CAPTION = (
+    "Lips16 figure 16: RBF network and affine map over time, each with its best parameters. Above, mean "
+    "vertex error over the mouth mask; below, error of the layers where they are known."
+)
+_MAP_CAPTION = (
+    "{}: distance of each vertex to its corresponding point, held-out frames with the largest error "
+    "of the base track; grey is not measured (Lips16 figures 14 and 15)."
+)
+
+
+def _key_figures(found: Findings) -> str:
+    items = []
+    rows = _together(found.table1).set_index("regressor")
+    for name in in_order(name for name in rows.index if not is_variant(name)):
+        row = rows.loc[name]
+        if name == "base":
+            items.append((f"{row['mean_mm']:.2f} mm", "base track, mean error over the mouth"))
+        else:
+            ratio = f"{row['ratio_to_base']:.2f}"
+            items.append((ratio, f"of base: {name} ({row['mean_mm']:.2f} mm)"))
+    h = _value(found.measures, "surface_error_median_mm", "vermilion", "H")
+    if h is not None:
+        items.append((f"{h:.2f} mm", "H, median surface error over the vermilion"))
+    items.append((str(len(found.flagged)), "flagged frames, all stages"))
+    return page.figures(items)
+
+
+def _table1(found: Findings) -> str:
+    if found.table1.empty:
+        return '<p class="none">No take has held-out frames.</p>'
+    rows = found.table1.copy()
+    rows["where"] = [place_of(s, t) for s, t in zip(rows["subject"], rows["take"], strict=True)]
+    headings = {
+        "where": "take", "regressor": "regressor", "mean_mm": "mean, mm", "low_mm": "low",
+        "high_mm": "high", "std_mm": "deviation, mm", "ratio_to_base": "of base",
+        "ratio_low": "low", "ratio_high": "high", "base_mm": "base on the same frames, mm",
+        "frames": "frames",
+    }  # fmt: skip
+    caption = (
+        "Mean vertex error over the mouth mask on held-out frames, area-weighted, with the interval "
+        "over clips. Lips16 reports 4.0 mm for its base tracker and 3.3, 3.0 and 3.2 mm for PS, MS "
+        "and GR on its own data."
+    )
+    own = rows[~rows["regressor"].map(is_variant)]
+    tables = page.table(own, headings, "where")
+    if len(own) < len(rows):
+        tables += page.folded("With all variants", page.table(rows, headings, "where"))
+    return tables + page.picture(found.table1_picture, caption)
+
+
+def _further(measures: pd.DataFrame) -> str:
+    rows = _together(measures)
+    rows = rows[rows["regressor"] != "H"]
+    if rows.empty:
+        return ""
+    wide = rows.pivot_table(
+        index=["region", "measure", "unit"], columns="regressor", values="value", sort=False
+    )
+    wide = wide[in_order(wide.columns)].reset_index()
+    headings = {"region": "region", "measure": "measure", "unit": "unit"}
+    headings |= {name: name for name in in_order(rows["regressor"])}
+    closed = "" if (rows["measure"] == "false_open_rate").any() else _NEVER_CLOSED
+    note = (
+        closed + "<p>All takes together; each take by itself is in <code>measures.tsv</code>.</p>"
+    )
+    return note + page.table(wide, headings, "region")
+
+
+_NEVER_CLOSED = (
+    "<p>No held-out frame has lips that touch in truth, so that there is no false_open_rate.</p>"
+)
+
+
+def _pictures(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
+    return "".join(page.picture(path, caption.format(name)) for name, path in pairs)
+
+
+def _reconstruction(found: Findings) -> str:
+    links = ", ".join(
+        f'<a href="{page.text(link)}">{page.text(name)}</a>' for name, link in found.reconstructions
+    )
+    links = f"<p>How each take was reconstructed, page by page: {links}.</p>" if links else ""
+    rows = found.measures[found.measures["regressor"] == "H"]
+    if rows.empty:
+        return links + '<p class="none">No tattoo take has known truth to hold H against.</p>'
+    rows = rows.assign(where=rows["subject"] + "/" + rows["take"])
+    headings = {
+        "where": "take", "region": "region", "measure": "measure", "value": "value",
+        "low": "low", "high": "high", "unit": "unit", "frames": "frames",
+    }  # fmt: skip
+    return links + (
+        "<p>The multi-view reconstruction itself against known truth, in the rig's world, without "
+        "any alignment.</p>" + page.table(rows, headings, "where")
+    )
+
+
+def _videos(found: Findings, limit_mb: float) -> str:
+    caption = "{}: original, base track, corrected; below, the mouth."
+    videos = "".join(
+        page.video(path, caption.format(name), limit_mb) for name, path in found.videos
+    )
+    return videos + "".join(
+        page.picture(path, _TIMELINE_CAPTION.format(name)) for name, path in found.timelines
+    )
+
+
+def _flagged(found: Findings) -> str:
+    if found.flagged.empty:
+        return '<p class="none">None.</p>'
+    rows = found.flagged.assign(where=found.flagged["subject"] + "/" + found.flagged["take"])
+    counts = (
+        rows.groupby(["stage", "where", "reason"], sort=False)["frame"]
+        .agg(["count", lambda frames: page.spans(frames.tolist())])
+        .set_axis(["count", "which"], axis=1)
+        .reset_index()
+    )
+    headings = {
+        "stage": "stage", "where": "take", "count": "frames", "which": "which", "reason": "reason"
+    }  # fmt: skip
+    return page.table(counts, headings, "stage")
+
+
+def _stages(overlays: Sequence[Overlay]) -> str:
+    body = ""
+    for stage in sorted({o.stage for o in overlays}, key=_rank):
+        of_stage = [o for o in overlays if o.stage == stage]
+        pictures = "".join(page.picture(o.path, o.what) for o in of_stage)
+        body += page.folded(f"{stage} ({len(of_stage)})", pictures)
+    return body
+
+
+def _rank(stage: str) -> tuple[int, str]:
+    return (_STAGES.index(stage) if stage in _STAGES else len(_STAGES), stage)
+
+
+def _together(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows of all takes together."""
+    return rows[(rows["subject"] == "all") & (rows["take"] == "all")]
+
+
+def _value(measures: pd.DataFrame, measure: str, region: str, regressor: str) -> float | None:
+    rows = _together(measures)
+    rows = rows[
+        (rows["measure"] == measure) & (rows["region"] == region) & (rows["regressor"] == regressor)
+    ]
+    return None if rows.empty else float(rows["value"].iloc[0])

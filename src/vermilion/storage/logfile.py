@@ -1,0 +1,28 @@
+"""Send what a job prints, and its traceback, to its log file."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+
+from vermilion.storage.errors import VermilionError
+
+
+def log_to(path: str | Path) -> None:
+    """Redirect standard output and error of this process to `path`, line by line.
+
+    An uncaught error is written to the log and, as one paragraph, to the terminal: a user should
+    not need to look for the log to learn which frame failed.
+    """
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    terminal = sys.stderr
+    stream = open(path, "w", buffering=1)  # noqa: SIM115 - open until the process ends
+    sys.stdout = sys.stderr = stream
+
+    def report(kind, error, trace):
+        traceback.print_exception(kind, error, trace, file=stream)
+        what = str(error) if isinstance(error, VermilionError) else f"{kind.__name__}: {error}"
+        print(f"\n{what}\nLog: {path}\n", file=terminal, flush=True)
+
+    sys.excepthook = report

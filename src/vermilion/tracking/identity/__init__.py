@@ -1,0 +1,1 @@
+"""The person: identity coefficients from landmarks and from images (Lips16 3.2)."""

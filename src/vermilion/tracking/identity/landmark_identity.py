@@ -1,0 +1,263 @@
+"""Who it is: identity coefficients from landmarks of frames of all of a subject's takes.
+
+Identity, landmark offsets, focal lengths (where unknown), poses and weights are found together, by
+Gauss-Newton with the frames eliminated (Schur complement).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vermilion.faces.model import FaceModel
+from vermilion.storage.errors import InputError
+from vermilion.tracking.landmark_fit.descent import NormalEquations, descend, pressed
+from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.observation import (
+    LandmarkNoise,
+    Observations,
+    pose_jacobian,
+    project,
+    projection_jacobian,
+    robust_cost,
+    robust_weights,
+    whitening,
+)
+from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
+from vermilion.tracking.landmark_fit.start import first_guess, in_chart
+
+
+@dataclass(frozen=True)
+class IdentitySettings:
+    """Priors of the person; the same for everybody.
+
+    Attributes:
+        fit: noise and weights, as in tracking.
+        bias: how far a person's landmarks, as the detector sees them, lie from the model's in
+            every frame alike, as fractions of the inter-ocular distance.
+        neutral_weight_sigma: deviation of the weights in a frame known to be neutral.
+        focal_sigma: deviation of the logarithm of an unknown focal length about the guess.
+        iterations: of Gauss-Newton, at most.
+    """
+
+    fit: FitSettings = field(default_factory=FitSettings)
+    bias: LandmarkNoise = field(default_factory=lambda: LandmarkNoise(0.08, 0.05, 0.04, 0.04, 0.04))
+    neutral_weight_sigma: float = 0.03
+    focal_sigma: float = 0.3
+    iterations: int = 60
+
+
+@dataclass(frozen=True)
+class TakeSample:
+    """Landmarks of some frames of a take.
+
+    Attributes:
+        name: the take.
+        seen: its frames; those not valid are left out.
+        focal_px: known, or the guess to start from.
+        calibrated: whether it is known.
+        neutral: (n,) bool, which frames show the neutral.
+    """
+
+    name: str
+    seen: Observations
+    focal_px: float
+    calibrated: bool
+    neutral: np.ndarray
+
+
+@dataclass(frozen=True)
+class IdentityFit:
+    """The person.
+
+    Attributes:
+        identity: (I,) in standard deviations.
+        landmark_offset_mm: (66, 3) in the head frame: where the detector sees the landmarks of
+            the neutral, less where the model has them.
+        focal_px: take -> focal length, of every take.
+        reprojection_px: root mean square over all frames.
+    """
+
+    identity: np.ndarray
+    landmark_offset_mm: np.ndarray
+    focal_px: dict[str, float]
+    reprojection_px: float
+
+
+def fit_identity(
+    model: FaceModel, samples: list[TakeSample], settings: IdentitySettings | None = None
+) -> IdentityFit:
+    """Fit one person. Raises InputError where no sampled frame has landmarks."""
+    problem = IdentityProblem(model, samples, settings or IdentitySettings())
+    return problem.result(*problem.solve())
+
+
+class IdentityProblem:
+    """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (198), log focal (takes)."""
+
+    def __init__(self, model, samples, settings):
+        keep = [np.flatnonzero(sample.seen.valid) for sample in samples]
+        counts = [len(k) for k in keep]
+        if sum(counts) == 0:
+            raise InputError(
+                "no frame with landmarks in any take",
+                "a face in at least one frame",
+                "Look at the landmark overlays; check the detector's settings.",
+            )
+        self.samples, self.settings = samples, settings
+        self.shape = LandmarkShape.of(model)
+        self.identities = without_size(landmark_identities(model), self.shape.neutral_mm)
+        self.n_identity, self.n_weights = len(self.identities), self.shape.n_expressions
+        parts = [sample.seen[k] for sample, k in zip(samples, keep, strict=True)]
+        self.image = np.concatenate([part.image for part in parts])
+        self.trust = np.concatenate([part.trust for part in parts])
+        self.take = np.repeat(np.arange(len(samples)), counts)
+        self.n_frames = len(self.take)
+        neutral = np.concatenate([s.neutral[k] for s, k in zip(samples, keep, strict=True)])
+        sigma = np.where(neutral, settings.neutral_weight_sigma, settings.fit.weight_sigma)
+        self.frame_prior = np.zeros((self.n_frames, N_POSE + self.n_weights))
+        self.frame_prior[:, N_POSE:] = sigma[:, None] ** -2.0
+        self.guess = np.log([sample.focal_px for sample in samples])
+        corners = self.shape.neutral_mm[[36, 45]]
+        interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
+        # A known focal length is one whose prior is so tight that it cannot move.
+        loose = np.array([not sample.calibrated for sample in samples])
+        self.shared_prior = np.concatenate(
+            [
+                np.ones(self.n_identity),
+                np.repeat((settings.bias.per_landmark() * interocular_mm) ** -2.0, 3),
+                np.where(loose, settings.focal_sigma**-2.0, 1e12),
+            ]
+        )
+        self.sigma_mm = settings.fit.noise.per_landmark() * interocular_mm
+
+    def first_guess(self):
+        seen = Observations(self.image, self.trust, np.ones(self.n_frames, dtype=bool))
+        rotation, translation, weights = first_guess(
+            self.shape,
+            seen,
+            self.sigma_mm,
+            np.exp(self.guess)[self.take],
+            self.settings.fit.weight_sigma,
+        )
+        vectors, self.reference = in_chart(rotation)
+        self.sigma_px = self.sigma_mm * (np.exp(self.guess)[self.take] / translation[:, 2])[:, None]
+        frames = np.concatenate([vectors, translation, weights], axis=1)
+        shared = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
+        return frames, shared
+
+    def _neutral(self, shared: np.ndarray) -> np.ndarray:
+        offset = shared[self.n_identity : self.n_identity + 198].reshape(66, 3)
+        person = np.tensordot(shared[: self.n_identity], self.identities, axes=1)
+        return self.shape.neutral_mm + person + offset
+
+    def focal(self, shared: np.ndarray) -> np.ndarray:
+        """(F, 1) pixels."""
+        return np.exp(shared[self.n_identity + 198 :])[self.take][:, None]
+
+    def _residual(self, points: np.ndarray, focal: np.ndarray):
+        image = project(points, focal)
+        white = whitening(image, self.sigma_px, self.trust, self.settings.fit.jaw_slide)
+        return image, white, (white @ (image - self.image)[..., None])[..., 0]
+
+    def _camera_points(self, frames: np.ndarray, shared: np.ndarray) -> np.ndarray:
+        shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
+        rotation = rotation_of(frames[:, :3]) @ self.reference
+        points = shape.points(frames[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2)
+        return points + frames[:, None, 3:6]
+
+    def _shared_from_prior(self, shared: np.ndarray) -> np.ndarray:
+        centre = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
+        return shared - centre
+
+    def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
+        points = self._camera_points(frames, shared)
+        if (points[..., 2] <= 1.0).any():
+            return np.inf
+        _, _, residual = self._residual(points, self.focal(shared))
+        total = robust_cost(residual, self.settings.fit.noise.robust_sigmas).sum()
+        total += 0.5 * (self.frame_prior * frames**2).sum()
+        total += 0.5 * (self.shared_prior * self._shared_from_prior(shared) ** 2).sum()
+        return float(total)
+
+    def _linearised(self, frames: np.ndarray, shared: np.ndarray):
+        """Weighted residuals (F, 132) and Jacobians by frame unknowns and by shared ones."""
+        shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
+        turned, by_rotation = pose_jacobian(
+            frames[:, :3], self.reference, shape.points(frames[:, N_POSE:])
+        )
+        points = turned + frames[:, None, 3:6]
+        focal = self.focal(shared)
+        image, white, residual = self._residual(points, focal)
+        limit = self.settings.fit.noise.robust_sigmas
+        root = np.sqrt(robust_weights(residual, limit))[..., None]
+        white, residual = white * root[..., None], residual * root
+        by_point = white @ projection_jacobian(points, focal)
+        by_head = by_point @ (rotation_of(frames[:, :3]) @ self.reference)[:, None]
+        by_weight = np.einsum("fnij,knj->fnik", by_head, self.shape.expressions_mm)
+        by_frame = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
+        n = self.n_identity
+        by_shared = np.zeros((self.n_frames, 66, 2, len(shared)))
+        by_shared[..., :n] = np.einsum("fnij,knj->fnik", by_head, self.identities)
+        landmark = np.arange(66)
+        for axis in range(3):
+            by_shared[:, landmark, :, n + 3 * landmark + axis] = np.moveaxis(
+                by_head[..., axis], 0, 1
+            )
+        column = n + 198 + self.take
+        by_shared[np.arange(self.n_frames), :, :, column] = (white @ image[..., None])[..., 0]
+        size = (self.n_frames, 132)
+        return residual.reshape(size), by_frame.reshape(*size, -1), by_shared.reshape(*size, -1)
+
+    def normal_equations(self, frames: np.ndarray, shared: np.ndarray) -> NormalEquations:
+        """Of the energy at a state, no weight held."""
+        residual, by_frame, by_shared = self._linearised(frames, shared)
+        blocks = np.swapaxes(by_frame, 1, 2) @ by_frame
+        diagonal = np.arange(blocks.shape[1])
+        blocks[:, diagonal, diagonal] += self.frame_prior
+        flat = by_shared.reshape(-1, by_shared.shape[-1])
+        shared_gradient = np.einsum("fr,frs->s", residual, by_shared)
+        return NormalEquations(
+            blocks,
+            np.swapaxes(by_frame, 1, 2) @ by_shared,
+            flat.T @ flat + np.diag(self.shared_prior),
+            (residual[:, None] @ by_frame)[:, 0] + self.frame_prior * frames,
+            shared_gradient + self.shared_prior * self._shared_from_prior(shared),
+        )
+
+    def newton_step(self, frames: np.ndarray, shared: np.ndarray):
+        """Gauss-Newton step with the weights that press against their bounds held."""
+        found = self.normal_equations(frames, shared)
+        held = pressed(frames, found.frame_gradient)
+        gradient = np.where(held, 0.0, found.frame_gradient)
+        coupling = np.where(held[..., None], 0.0, found.coupling)
+        blocks = np.where(held[:, None] | held[..., None], 0.0, found.blocks)
+        diagonal = np.arange(blocks.shape[1])
+        blocks[:, diagonal, diagonal] += np.where(held, 1.0, 0.0)
+        blocks[:, diagonal, diagonal] *= 1 + 1e-9
+        solved = np.linalg.solve(blocks, np.concatenate([coupling, gradient[..., None]], axis=-1))
+        system = found.system - np.einsum("fps,fpt->st", coupling, solved[..., :-1], optimize=True)
+        right = np.einsum("fps,fp->s", coupling, solved[..., -1]) - found.shared_gradient
+        shared_step = np.linalg.solve(system, right)
+        frame_step = -(solved[..., -1] + solved[..., :-1] @ shared_step)
+        return np.where(held, 0.0, frame_step), shared_step
+
+    def solve(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frames (F, 6 + K) and shared unknowns (S,) from landmarks alone."""
+        return descend(self, *self.first_guess(), self.settings.iterations)
+
+    def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
+        image = project(self._camera_points(frames, shared), self.focal(shared))
+        squared = ((image - self.image) ** 2).sum(axis=-1)[:, 17:]
+        focal = np.exp(shared[self.n_identity + 198 :])
+        known = [
+            s.focal_px if s.calibrated else f for s, f in zip(self.samples, focal, strict=True)
+        ]
+        return IdentityFit(
+            identity=shared[: self.n_identity].copy(),
+            landmark_offset_mm=shared[self.n_identity : self.n_identity + 198].reshape(66, 3),
+            focal_px={s.name: float(f) for s, f in zip(self.samples, known, strict=True)},
+            reprojection_px=float(np.sqrt(squared.mean())),
+        )

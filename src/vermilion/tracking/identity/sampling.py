@@ -1,0 +1,83 @@
+"""Which frames of a subject's takes tell who it is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vermilion.geometry.camera import Camera, read_cameras
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.tracking.identity.landmark_identity import TakeSample
+from vermilion.tracking.landmark_fit.observation import Observations, focal_px
+
+
+@dataclass(frozen=True)
+class SampledFrames:
+    """Frames of a take that tell who it is.
+
+    Attributes:
+        sample: their landmarks.
+        camera: of the take.
+        frames: (n,) their numbers.
+    """
+
+    sample: TakeSample
+    camera: Camera
+    frames: np.ndarray
+
+
+def sample_takes(
+    takes: Sequence[Mapping[str, Any]],
+    landmarks: Sequence[str],
+    cameras: Sequence[str],
+    calibrations: Sequence[str],
+    count: int,
+) -> list[SampledFrames]:
+    """Frames of all of a subject's takes.
+
+    Args:
+        takes: of each take its name (`take`), its camera (`camera`), the frame that shows the
+            neutral or None (`neutral`), and how many of `landmarks` are its (`chunks`).
+        landmarks: files of all takes, take by take.
+        cameras, calibrations: folder of cameras and summary of the calibration, one a take.
+        count: frames of all takes together, about.
+    """
+    paths: Iterator[str] = iter(landmarks)
+    tracks = {
+        row["take"]: LandmarkTrack.load([next(paths) for _ in range(row["chunks"])])
+        for row in takes
+    }
+    chosen = spread_frames({name: track.valid for name, track in tracks.items()}, count)
+    found = []
+    for row, folder, summary in zip(takes, cameras, calibrations, strict=True):
+        name, camera = row["take"], read_cameras(folder)[row["camera"]]
+        rows = chosen.get(name, np.zeros(0, dtype=int))
+        frames = tracks[name].frames[rows]
+        with open(summary, encoding="utf-8") as stream:
+            calibrated = bool(json.load(stream)["calibrated"])
+        seen = Observations.of(tracks[name], camera)[rows]
+        neutral = frames == row["neutral"]
+        sample = TakeSample(name, seen, focal_px(camera), calibrated, neutral)
+        found.append(SampledFrames(sample, camera, frames))
+    return found
+
+
+def spread_frames(valid: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """Rows of each take, evenly spread over its valid frames, its first frame among them.
+
+    Args:
+        valid: take -> (F,) bool.
+        count: rows of all takes together, about; every take with a valid frame has at least one.
+    """
+    usable = {take: np.flatnonzero(mask) for take, mask in valid.items()}
+    usable = {take: rows for take, rows in usable.items() if len(rows)}
+    each = max(1, round(count / max(len(usable), 1)))
+    chosen = {}
+    for take, rows in usable.items():
+        places = np.linspace(0, len(rows) - 1, min(each, len(rows))).round().astype(int)
+        chosen[take] = rows[np.unique(places)]
+    return chosen

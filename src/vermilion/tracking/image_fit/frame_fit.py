@@ -1,0 +1,236 @@
+"""Pose and expression of one frame from its picture (Lips16 3.2): Gauss-Newton, coarse to fine.
+
+Minimises, over the rotation, the translation and the weights w in [0, 1],
+
+    strength * mean over visible samples of rho(|display(picture) - display(albedo * SH(normal))|)
+    + the landmark terms and |w|^2 / weight_sigma^2 of the landmark fit
+    + |x - x_landmarks|^2 over how far a track may be moved
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.appearance.estimate import Appearance
+from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
+from vermilion.appearance.sampled_face import SampledFace
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.display import display_slope, to_display_values
+from vermilion.tracking.image_fit.image_levels import Level
+from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
+from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.expression import N_POSE
+from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
+from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
+
+
+@dataclass(frozen=True)
+class PhotometricSettings:
+    """How much the picture counts.
+
+    Attributes:
+        sigma: deviation of a colour, display values (0 to 255).
+        robust_sigmas: a sample this many deviations off counts half (Cauchy).
+        strength: how many independent samples the whole face is worth.
+        rotation_deg, translation_mm, depth_mm, weight: typical moves from the landmark fit.
+        iterations: Gauss-Newton steps at each resolution, coarsest first.
+        shading: whether the shading's change with the normal counts, or the motion alone.
+    """
+
+    sigma: float = 6.0
+    robust_sigmas: float = 2.0
+    strength: float = 4000.0
+    rotation_deg: float = 3.0
+    translation_mm: float = 5.0
+    depth_mm: float = 10.0
+    weight: float = 0.2
+    iterations: Sequence[int] = (3, 3, 4)
+    shading: bool = False
+
+
+@dataclass(frozen=True)
+class View:
+    """One frame: what the model is compared with.
+
+    Attributes:
+        levels: the picture, finest first.
+        focal_px: of the ideal pinhole.
+        trust: (N,) of each sample in this frame, zero where hidden.
+        landmarks: the frame's landmark term.
+        start: (6 + K,) the landmark fit.
+        reference: (3, 3) about which the rotation vector turns.
+    """
+
+    levels: list[Level]
+    focal_px: float
+    trust: np.ndarray
+    landmarks: LandmarkTerm
+    start: np.ndarray
+    reference: np.ndarray
+
+
+@dataclass(frozen=True)
+class FrameFit:
+    """A frame's solution and the quadratic about it.
+
+    Attributes:
+        x: (6 + K,).
+        matrix: (6 + K, 6 + K) and right (6 + K,): energy ~ x'Ax/2 - b'x near the solution.
+    """
+
+    x: np.ndarray
+    matrix: np.ndarray
+    right: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The samples that one frame shows: face, albedo (L, n, 3), trust (n,)."""
+
+    face: SampledFace
+    albedo: np.ndarray
+    trust: np.ndarray
+
+
+class FrameProblem:
+    """The energy above, of one person in one appearance."""
+
+    def __init__(
+        self,
+        face: SampledFace,
+        appearance: Appearance,
+        settings: PhotometricSettings,
+        weight_sigma: float,
+    ):
+        self.face, self.appearance, self.settings = face, appearance, settings
+        n_weights = face.expressions_mm.shape[2]
+        self.weight_prior = np.full(N_POSE + n_weights, weight_sigma**-2.0)
+        self.weight_prior[:N_POSE] = 0.0
+        s = settings
+        typical = np.full(N_POSE + n_weights, s.weight)
+        typical[:3], typical[3:5], typical[5] = (
+            np.radians(s.rotation_deg),
+            s.translation_mm,
+            s.depth_mm,
+        )
+        self.stay = typical**-2.0
+        self.lower = np.full(N_POSE + n_weights, -np.inf)
+        self.upper = -self.lower
+        self.lower[N_POSE:], self.upper[N_POSE:] = 0.0, 1.0
+
+    def solve(self, view: View) -> FrameFit:
+        """Coarse to fine from the landmark fit."""
+        x, counts = view.start, self.settings.iterations
+        none = np.zeros((0, len(x)))
+        for level, count in zip(reversed(range(len(counts))), counts, strict=True):
+            # Coarse pictures need fewer samples.
+            part = self._part(view, 2**level)
+            cost = self._cost(x, view, level, part)
+            for _ in range(count):
+                matrix, right = self._normal_equations(x, view, level, part)
+                target = solve_in_box(
+                    BandMatrix(matrix[None], none, none),
+                    right[None],
+                    self.lower,
+                    self.upper,
+                    x[None],
+                )[0]
+                for scale in (1.0, 0.5, 0.25):
+                    trial = x + scale * (target - x)
+                    trial_cost = self._cost(trial, view, level, part)
+                    if trial_cost < cost:
+                        break
+                else:
+                    break
+                x, cost = trial, trial_cost
+        matrix, right = self._normal_equations(x, view, 0, part)
+        return FrameFit(x, matrix, right)
+
+    def _part(self, view: View, every: int) -> _Part:
+        rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))[::every]
+        return _Part(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
+
+    def _errors(self, x, view, level, part):
+        """Picture less model in display values (n, 3), what they came from, and trust (n,)."""
+        rotation = rotation_of(x[:3]) @ view.reference
+        turned = part.face.points(x[N_POSE:]) @ rotation.T
+        points = turned + x[3:6]
+        normals = part.face.normals(x[N_POSE:]) @ rotation.T
+        found, slopes, inside = view.levels[level].sample(project(points, view.focal_px))
+        predicted = part.albedo[level] * irradiance(normals, self.appearance.light)
+        error = to_display_values(found) - to_display_values(predicted)
+        seen = display_slope(found)[..., None] * slopes
+        return error, (rotation, turned, points, normals, seen, predicted), part.trust * inside
+
+    def _cost(self, x, view, level, part) -> float:
+        error, _, weight = self._errors(x, view, level, part)
+        s = self.settings
+        squared = (error**2).sum(axis=1) / (3 * s.sigma**2 * s.robust_sigmas**2)
+        rho = 0.5 * s.robust_sigmas**2 * np.log1p(squared)
+        total = s.strength * (weight * rho).sum() / max(weight.sum(), 1e-9)
+        total += view.landmarks.cost(x, view.reference)
+        total += 0.5 * (self.weight_prior * x**2).sum()
+        return float(total + 0.5 * (self.stay * (x - view.start) ** 2).sum())
+
+    def _normal_equations(self, x, view, level, part):
+        """Matrix A and right b with x'Ax/2 - b'x the energy's quadratic at x."""
+        error, parts, weight = self._errors(x, view, level, part)
+        s = self.settings
+        robust = 1.0 / (1.0 + (error**2).sum(axis=1) / (3 * s.sigma**2 * s.robust_sigmas**2))
+        scale = s.strength / (3 * s.sigma**2) * weight * robust / max(weight.sum(), 1e-9)
+        root = np.sqrt(scale).astype(np.float32)
+        jacobian = self._jacobian(x, view, level, part, parts) * root[:, None, None]
+        rows = jacobian.reshape(-1, jacobian.shape[-1])
+        values = (error * root[:, None]).astype(np.float32).reshape(-1)
+        matrix, gradient = view.landmarks.normal_equations(x, view.reference)
+        matrix = matrix + (rows.T @ rows).astype(np.float64)
+        gradient = gradient + (rows.T @ values).astype(np.float64)
+        right = matrix @ x - gradient + self.stay * view.start
+        diagonal = np.arange(len(x))
+        matrix[diagonal, diagonal] += self.stay + self.weight_prior
+        return matrix, right
+
+    def _jacobian(self, x, view, level, part, parts) -> np.ndarray:
+        """Derivative (n, 3, 6 + K) float32 of the errors."""
+        rotation, turned, points, normals, seen, predicted = parts
+        turn = left_jacobian(x[:3])
+        by_point = seen @ projection_jacobian(points, view.focal_px)
+        by_rotation = by_point @ (-cross_matrix(turned) @ turn)
+        by_weight = (by_point @ rotation).astype(np.float32) @ part.face.expressions_mm
+        if self.settings.shading:
+            albedo = part.albedo[level] * display_slope(predicted)
+            by_normal = np.tensordot(
+                harmonics_jacobian(normals), self.appearance.light, axes=([1], [0])
+            )
+            by_normal = albedo[..., None] * np.swapaxes(by_normal, 1, 2)
+            by_rotation -= by_normal @ (-cross_matrix(normals) @ turn)
+            by_weight -= part.face.through_normals(x[N_POSE:], by_normal @ rotation)
+        return np.concatenate(
+            [by_rotation.astype(np.float32), by_point.astype(np.float32), by_weight], axis=2
+        )
+
+
+def visible_trust(
+    model: FaceModel,
+    vertices_mm: np.ndarray,
+    points_mm: np.ndarray,
+    normals: np.ndarray,
+    least_cosine: float = 0.25,
+) -> np.ndarray:
+    """Trust (N,) of samples: how squarely the camera sees them, zero where hidden or oblique.
+
+    Args:
+        vertices_mm: (V, 3); points_mm, normals: (N, 3); all in the camera frame.
+    """
+    distance = np.linalg.norm(points_mm, axis=1)
+    rays = points_mm / distance[:, None]
+    cosine = -(normals * rays).sum(axis=1)
+    trust = np.clip((cosine - least_cosine) / (1 - least_cosine), 0.0, 1.0)
+    facing = np.flatnonzero(trust > 0)
+    hits = RayCaster(vertices_mm, model.triangles).cast(np.zeros(3), rays[facing])
+    trust[facing[hits.distance_mm < distance[facing] - 1.0]] = 0.0
+    return trust

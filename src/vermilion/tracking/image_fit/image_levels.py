@@ -1,0 +1,120 @@
+"""A picture about the face at a few coarse resolutions, sampled between its pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vermilion.geometry.camera import Camera
+from vermilion.tracking.landmark_fit.observation import focal_px
+
+_MARGIN_MM = 12.0
+
+
+@dataclass(frozen=True)
+class Level:
+    """One resolution.
+
+    Attributes:
+        colours: (h, w, 3) float32 linear RGB.
+        slopes_x, slopes_y: (h, w, 3) float32 derivatives, per pixel of the level.
+        origin: (2,) pixels from the principal point (an ideal pinhole of the camera's x focal
+            length) of the upper left corner.
+        step: (2,) of such pixels a pixel of the level.
+    """
+
+    colours: np.ndarray
+    slopes_x: np.ndarray
+    slopes_y: np.ndarray
+    origin: np.ndarray
+    step: np.ndarray
+
+    def sample(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """At points (N, 2), pixels from the principal point.
+
+        Returns:
+            values (N, 3); derivatives (N, 3, 2) per such pixel; inside (N,) bool.
+        """
+        place = (image - self.origin) / self.step - 0.5
+        height, width = self.colours.shape[:2]
+        with np.errstate(invalid="ignore"):
+            inside = ((place >= 0) & (place <= [width - 1, height - 1])).all(axis=1)
+        place = np.where(inside[:, None], place, 0.0).astype(np.float32)
+        found = [
+            cv2.remap(part, place[:, None, 0], place[:, None, 1], cv2.INTER_LINEAR)[:, 0]
+            for part in (self.colours, self.slopes_x, self.slopes_y)
+        ]
+        slopes = np.stack([found[1] / self.step[0], found[2] / self.step[1]], axis=-1)
+        return found[0], slopes, inside
+
+
+def levels_of(
+    picture: np.ndarray,
+    camera: Camera,
+    points_mm: np.ndarray,
+    pixel_mm: float,
+    count: int,
+) -> list[Level]:
+    """The picture round points in the camera frame, finest level first.
+
+    Args:
+        picture: (h, w, 3) linear RGB.
+        points_mm: (N, 3) in the camera frame.
+        pixel_mm: size of a pixel of the finest level at the points' mean depth; never finer than
+            the picture itself.
+        count: of levels, each half as fine as the one before.
+    """
+    focal = focal_px(camera)
+    depth = float(points_mm[:, 2].mean())
+    image = focal * points_mm[:, :2] / points_mm[:, 2:3]
+    margin = focal * _MARGIN_MM / depth
+    low, high = image.min(axis=0) - margin, image.max(axis=0) + margin
+    flat, origin, size = _ideal(picture, camera, low, high)
+    wanted = max(focal * pixel_mm / depth, 1.0)
+    levels = []
+    for index in range(count):
+        shape = np.maximum(np.rint(size / (wanted * 2.0**index)), 4).astype(int)
+        if index == 0:
+            small = cv2.resize(flat, tuple(int(n) for n in shape), interpolation=cv2.INTER_AREA)
+        else:
+            small = cv2.resize(
+                cv2.GaussianBlur(small, (0, 0), 0.8),
+                tuple(int(n) for n in shape),
+                interpolation=cv2.INTER_AREA,
+            )
+        soft = cv2.GaussianBlur(small, (0, 0), 0.7)
+        slopes = [cv2.Sobel(soft, cv2.CV_32F, *axis, ksize=3, scale=0.125) for axis in _AXES]
+        levels.append(Level(soft, *slopes, origin, size / shape))
+    return levels
+
+
+_AXES = ((1, 0), (0, 1))
+
+
+def _ideal(picture, camera, low, high):
+    """The part of the picture between two corners (pixels from the principal point).
+
+    Returns it with its corner and its size in such pixels.
+    """
+    k = camera.calibration
+    squeeze = np.array([1.0, k[1, 1] / k[0, 0]])
+    centre = k[:2, 2]
+    if not camera.is_pinhole:
+        picture = _undistorted(picture, camera)
+    height, width = picture.shape[:2]
+    first = np.clip(np.floor(low * squeeze + centre), 0, [width - 8, height - 8]).astype(int)
+    last = np.clip(np.ceil(high * squeeze + centre), first + 8, [width, height]).astype(int)
+    part = picture[first[1] : last[1], first[0] : last[0]]
+    return part, (first - centre) / squeeze, (last - first) / squeeze
+
+
+def _undistorted(picture: np.ndarray, camera: Camera) -> np.ndarray:
+    """The picture of the ideal pinhole camera with the same calibration matrix."""
+    k = camera.calibration
+    normal = (camera.pixel_grid() - k[:2, 2]) / [k[0, 0], k[1, 1]]
+    rays = np.concatenate([normal, np.ones((*normal.shape[:2], 1))], axis=-1)
+    world = (rays - camera.translation) @ camera.rotation
+    place = (camera.project(world) - 0.5).astype(np.float32)
+    return cv2.remap(picture, place[..., 0], place[..., 1], cv2.INTER_LINEAR)

@@ -1,0 +1,65 @@
+"""The landmarks of one frame as part of its energy: the same terms as in the landmark fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.tracking.landmark_fit.expression import (
+    N_POSE,
+    FitSettings,
+    landmark_cost,
+    landmark_equations,
+)
+from vermilion.tracking.landmark_fit.observation import Observations
+from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
+
+
+@dataclass(frozen=True)
+class LandmarkTerm:
+    """Landmarks of one frame against the model's.
+
+    Attributes:
+        shape: the person's landmarks.
+        seen: one frame.
+        focal_px: of the camera.
+        sigma_px: (66,) deviations.
+        settings: of the landmark fit.
+    """
+
+    shape: LandmarkShape
+    seen: Observations
+    focal_px: float
+    sigma_px: np.ndarray
+    settings: FitSettings
+
+    @classmethod
+    def of(
+        cls,
+        shape: LandmarkShape,
+        seen: Observations,
+        focal_px: float,
+        depth_mm: float,
+        settings: FitSettings,
+    ) -> LandmarkTerm:
+        """With deviations that are a share of the inter-ocular distance at `depth_mm`."""
+        corners = shape.neutral_mm[[36, 45]]
+        interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
+        sigma = settings.noise.per_landmark() * interocular_mm * focal_px / depth_mm
+        return cls(shape, seen, focal_px, sigma[None], settings)
+
+    def cost(self, x: np.ndarray, reference: np.ndarray) -> float:
+        """Of unknowns x (6 + K): rotation vector about `reference` (3, 3), translation, weights."""
+        points = self.shape.points(x[N_POSE:]) @ (rotation_of(x[:3]) @ reference).T + x[3:6]
+        return landmark_cost(points[None], self.seen, self.focal_px, self.sigma_px, self.settings)
+
+    def normal_equations(
+        self, x: np.ndarray, reference: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gauss-Newton matrix (P, P) and gradient (P,) at x (P,)."""
+        matrix, gradient = landmark_equations(
+            self.shape, self.seen, self.focal_px, self.sigma_px, reference, x[None], self.settings
+        )
+        return matrix[0], gradient[0]

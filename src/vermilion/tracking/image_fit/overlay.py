@@ -1,0 +1,102 @@
+"""Pictures of the refinement: what was estimated, and what is left unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from vermilion.appearance.estimate import Appearance
+from vermilion.appearance.harmonics import irradiance
+from vermilion.appearance.samples import SurfaceSamples
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.imaging.draw import colour_map, label, tile, to_display
+from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.overlay import cut_to
+
+_WORST = 40.0  # display values at the hottest colour
+
+
+def to_vertices(
+    values: np.ndarray,
+    trust: np.ndarray,
+    samples: SurfaceSamples,
+    triangles: np.ndarray,
+    count: int,
+) -> np.ndarray:
+    """Values at the samples (N, C) as means at the vertices (V, C); the overall mean where unseen."""
+    at = samples.matrix(triangles, count)
+    weight = at.T @ trust
+    total = (trust[:, None] * values).sum(axis=0) / max(trust.sum(), 1e-9)
+    mean = (at.T @ (trust[:, None] * values)) / np.maximum(weight, 1e-9)[:, None]
+    return np.where(weight[:, None] > 1e-6, mean, total)
+
+
+def appearance_picture(
+    picture: np.ndarray, start: TakeStart, x: np.ndarray, appearance: Appearance
+) -> np.ndarray:
+    """Picture, model, albedo and light side by side, (h, w, 3) uint8.
+
+    Args:
+        picture: (h, w, 3) linear; x: (6 + K,) of its frame.
+    """
+    camera, triangles = start.camera, start.model.triangles
+    local = start.vertices(x)
+    world = (local - camera.translation) @ camera.rotation
+    hits = RayCaster(world, triangles).see(camera)
+    normals = interpolate(hits, triangles, vertex_normals(local, triangles))
+    light = irradiance(normalised(normals), appearance.light)
+    vertices = to_vertices(
+        appearance.albedo[0], np.minimum(appearance.seen, 1.0), appearance.samples, triangles,
+        len(local),
+    )  # fmt: skip
+    albedo = interpolate(hits, triangles, vertices)
+    place, original = camera.project(world), to_display(picture)
+    panels = [label(cut_to(original, place), "picture")]
+    for name, colours in (("model", albedo * light), ("albedo", albedo), ("light", 0.5 * light)):
+        shown = np.where(hits.hit[..., None], to_display(colours), original)
+        panels.append(label(cut_to(shown, place), name))
+    return np.hstack(panels)
+
+
+def residual_sheet(
+    rows: Sequence[tuple[str, np.ndarray, Sequence[tuple]]], camera: Camera
+) -> np.ndarray:
+    """A row a frame, a column a step: the picture, and the error at every sample by its colour.
+
+    Args:
+        rows: (name, picture (h, w, 3) linear, [(label, errors (N, 3), trust (N,), place (N, 2))]);
+            places in pixels from the principal point of the ideal pinhole.
+        camera: of the pictures.
+    """
+    if not rows:
+        return np.zeros((64, 256, 3), dtype=np.uint8)
+    k = camera.calibration
+    squeeze = np.array([1.0, k[1, 1] / k[0, 0]])
+    panels = []
+    for name, picture, results in rows:
+        original = to_display(picture)
+        points = results[0][3] * squeeze + k[:2, 2]
+        panels.append(label(cut_to(original, points), name))
+        for text, errors, trust, place in results:
+            panels.append(
+                label(
+                    _error_picture(original, points, errors, trust, place * squeeze + k[:2, 2]),
+                    text,
+                )
+            )
+    return tile(panels, 1 + len(rows[0][2]))
+
+
+def _error_picture(original, points, errors, trust, place):
+    seen = np.flatnonzero(trust > 0)
+    colours = np.rint(255 * colour_map(np.abs(errors[seen]).mean(axis=1), 0.0, _WORST))
+    extent = points.max(axis=0) - points.min(axis=0)
+    radius = max(1, int(0.35 * np.sqrt(extent.prod() / len(points)) + 1))
+    shown = original.copy()
+    for (column, row), colour in zip(place[seen], colours.astype(int).tolist(), strict=True):
+        cv2.circle(shown, (int(column), int(row)), radius, colour, -1)
+    return cut_to(shown, points)

@@ -1,0 +1,44 @@
+"""How well the model explains a picture: what every refinement must lower."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.appearance.estimate import Appearance
+from vermilion.appearance.sampled_face import SampledFace
+from vermilion.imaging.display import to_display_values
+from vermilion.tracking.image_fit.frame_fit import View
+from vermilion.tracking.landmark_fit.expression import N_POSE
+from vermilion.tracking.landmark_fit.observation import project
+from vermilion.tracking.landmark_fit.pose import rotation_of
+
+
+def sample_errors(
+    view: View,
+    x: np.ndarray,
+    face: SampledFace,
+    appearance: Appearance,
+    offsets_mm: np.ndarray | float = 0.0,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Picture less model at each sample, in display values (0 to 255).
+
+    Args:
+        x: (6 + K,) pose and weights, about the view's reference.
+        offsets_mm: (N, 3) of the samples in the head frame.
+
+    Returns:
+        errors (N, 3); trust (N,), zero where not seen; place (N, 2) in pixels from the principal
+        point.
+    """
+    rotation = rotation_of(x[:3]) @ view.reference
+    points = (face.points(x[N_POSE:]) + offsets_mm) @ rotation.T + x[3:6]
+    image = project(points, view.focal_px)
+    found, _, inside = view.levels[0].sample(image)
+    predicted = appearance.colours(face.normals(x[N_POSE:]) @ rotation.T)
+    errors = to_display_values(found) - to_display_values(predicted)
+    return errors, view.trust * inside * (appearance.seen > 0), image
+
+
+def photometric_residual(errors: np.ndarray, trust: np.ndarray) -> float:
+    """Mean absolute error over the visible face, display values (0 to 255)."""
+    return float((trust * np.abs(errors).mean(axis=1)).sum() / max(trust.sum(), 1e-9))

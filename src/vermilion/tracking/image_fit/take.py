@@ -1,0 +1,227 @@
+"""One take's landmark fit as the start of its refinement: views of frames, and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from vermilion.appearance.estimate import Appearance, Sightings, estimate_appearance
+from vermilion.appearance.sampled_face import SampledFace
+from vermilion.appearance.samples import SurfaceSamples
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import Camera
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.scheme import JAW
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+from vermilion.tracking.image_fit.frame_fit import FrameProblem, View, visible_trust
+from vermilion.tracking.image_fit.image_levels import levels_of
+from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
+from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.observation import Observations, focal_px, project
+from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.landmark_fit.start import in_chart
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.settings import fit_settings
+
+
+class StartFiles(Protocol):
+    """Paths that a refinement starts from."""
+
+    tracker: str
+    identity: str
+    fit: str
+    landmarks: str | Sequence[str]
+
+
+@dataclass(frozen=True)
+class TakeStart:
+    """A take before its refinement.
+
+    Attributes:
+        model: the tracker's.
+        identity: of the person.
+        camera: of the pictures, with the focal length that was used.
+        x: (F, 6 + K) the landmark fit: rotation vector about `reference`, translation, weights.
+        reference: (3, 3).
+        seen: landmarks of the F frames.
+        settings: of the landmark fit.
+    """
+
+    model: FaceModel
+    identity: Identity
+    camera: Camera
+    x: np.ndarray
+    reference: np.ndarray
+    seen: Observations
+    settings: FitSettings
+
+    @classmethod
+    def of(
+        cls,
+        model: FaceModel,
+        identity: Identity,
+        fit: TrackedTake,
+        track: LandmarkTrack,
+        settings: FitSettings,
+        rows: np.ndarray | None = None,
+    ) -> TakeStart:
+        """Some rows of a landmark fit (all by default); `track` has these frames' landmarks."""
+        camera = fit.camera
+        rotation = camera.rotation @ fit.world_from_head_rotation
+        # The chart is the whole take's, so that chunks can be joined.
+        vectors, reference = in_chart(rotation)
+        translation = camera.to_camera(fit.world_from_head_translation_mm)
+        x = np.concatenate([vectors, translation, fit.weights], axis=1)
+        rows = np.arange(len(x)) if rows is None else np.asarray(rows)
+        place = {int(frame): row for row, frame in enumerate(track.frames)}
+        order = np.array([place[int(frame)] for frame in fit.frames[rows]], dtype=int)
+        seen = Observations.of(track, camera)[order]
+        return cls(model, identity, camera, x[rows], reference, seen, settings)
+
+    @classmethod
+    def load(
+        cls,
+        inputs: StartFiles,
+        cfg: Mapping[str, dict[str, Any]],
+        frames: Sequence[int] | None = None,
+    ) -> tuple[TrackedTake, np.ndarray, TakeStart]:
+        """(the take's track, rows of some frames in it, these frames): of files; all frames by default.
+
+        Args:
+            inputs: paths `tracker`, `identity`, `fit` and `landmarks` (one, or one a chunk).
+            cfg: sections `tracking.fit` and `tracking.motion`.
+        """
+        fit = TrackedTake.load(inputs.fit)
+        rows = np.arange(len(fit.frames)) if frames is None else fit.index_of(frames)
+        track = LandmarkTrack.load(inputs.landmarks)
+        settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+        model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
+        return fit, rows, cls.of(model, identity, fit, track, settings, rows)
+
+    def face(self, samples: SurfaceSamples) -> SampledFace:
+        """The person at some samples."""
+        return SampledFace.of(self.model, self.identity.neutral_mm, samples)
+
+    def vertices(self, x: np.ndarray) -> np.ndarray:
+        """Mesh (V, 3) of unknowns (6 + K,) in the camera frame."""
+        local = self.model.vertices(self.identity.identity, x[N_POSE:])
+        return local @ (rotation_of(x[:3]) @ self.reference).T + x[3:6]
+
+    def with_motion(self, fit: TrackedTake, x: np.ndarray) -> TrackedTake:
+        """`fit` with other poses and weights x (F, 6 + K), all frames of the take."""
+        rotation = rotation_of(x[:, :3]) @ self.reference
+        to_world = self.camera.rotation.T
+        shape = self.landmark_shape()
+        points = shape.points(x[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
+        squared = ((project(points, focal_px(self.camera)) - self.seen.image) ** 2).sum(axis=-1)
+        error = np.sqrt(squared[:, len(JAW) :].mean(axis=1))
+        return replace(
+            fit,
+            weights=x[:, N_POSE:],
+            world_from_head_rotation=to_world @ rotation,
+            world_from_head_translation_mm=(x[:, 3:6] - self.camera.translation) @ to_world.T,
+            reprojection_px=np.where(self.seen.valid, error, np.nan),
+        )
+
+    def landmark_shape(self) -> LandmarkShape:
+        """The person's landmarks."""
+        return LandmarkShape.of(
+            self.model, self.identity.identity, self.identity.landmark_offset_mm
+        )
+
+    def view(
+        self, row: int, picture: np.ndarray, face: SampledFace, pixel_mm: float, levels: int
+    ) -> View:
+        """What the refinement of one frame needs, from its picture (h, w, 3) linear."""
+        x, focal = self.x[row], focal_px(self.camera)
+        rotation = rotation_of(x[:3]) @ self.reference
+        points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
+        normals = face.normals(x[N_POSE:]) @ rotation.T
+        return View(
+            levels_of(picture, self.camera, points, pixel_mm, levels),
+            focal,
+            visible_trust(self.model, self.vertices(x), points, normals),
+            LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
+            x,
+            self.reference,
+        )
+
+
+def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sightings:
+    """What views show at the samples, the face being at unknowns xs (6 + K each)."""
+    colours, normals, trust = [], [], []
+    for view, x in zip(views, xs, strict=True):
+        rotation = rotation_of(x[:3]) @ view.reference
+        image = project(face.points(x[N_POSE:]) @ rotation.T + x[3:6], view.focal_px)
+        found = [level.sample(image) for level in view.levels]
+        colours.append(np.stack([values for values, _, _ in found]))
+        normals.append(face.normals(x[N_POSE:]) @ rotation.T)
+        trust.append(view.trust * found[0][2])
+    return Sightings(np.stack(colours), np.stack(normals), np.stack(trust))
+
+
+def learn_appearance(
+    frames: np.ndarray,
+    views: list[View],
+    face: SampledFace,
+    samples: SurfaceSamples,
+    albedo_prior: float,
+    rounds: int,
+    problem_of: Callable[[Appearance], FrameProblem],
+) -> Appearance:
+    """Light and albedo from some frames, whose poses and expressions are improved in turns with it."""
+    xs = [view.start for view in views]
+    for _ in range(rounds):
+        appearance = estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
+        problem = problem_of(appearance)
+        xs = [problem.solve(view).x for view in views]
+    return estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
+
+
+def readable(
+    valid: np.ndarray, read: Callable[[int], np.ndarray], name: str
+) -> Iterator[tuple[int, np.ndarray]]:
+    """(row, picture) of the valid rows (F,) bool; those that `read` cannot give are left out.
+
+    The capture stage has flagged them. Progress is reported under `name`.
+    """
+    for row in progress(np.flatnonzero(valid), name):
+        try:
+            yield row, read(row)
+        except InputError:
+            continue
+
+
+def refine_frames(
+    start: TakeStart,
+    valid: np.ndarray,
+    read: Callable[[int], np.ndarray],
+    problem: FrameProblem,
+    pixel_mm: float,
+) -> dict[str, np.ndarray]:
+    """Refine the frames of a `TakeStart` one by one.
+
+    Frames that are not valid (F,), or whose picture `read` (row -> linear RGB) cannot give, keep the
+    landmark fit.
+
+    Returns:
+        x (F, P), matrix (F, P, P), right (F, P) of `FrameFit`, refined (F,) bool.
+    """
+    n_frames, n_params = start.x.shape
+    result = {
+        "x": start.x.copy(),
+        "matrix": np.zeros((n_frames, n_params, n_params)),
+        "right": np.zeros((n_frames, n_params)),
+        "refined": np.zeros(n_frames, dtype=bool),
+    }
+    levels = len(problem.settings.iterations)
+    for row, picture in readable(valid, read, "photometric refinement"):
+        found = problem.solve(start.view(row, picture, problem.face, pixel_mm, levels))
+        result["x"][row], result["matrix"][row] = found.x, found.matrix
+        result["right"][row], result["refined"][row] = found.right, True
+    return result

@@ -1,0 +1,259 @@
+"""Pose and blend weights of a whole take from its landmarks (Mono13 6, full perspective).
+
+All frames are solved at once, by Gauss-Newton on
+
+    sum over frames and landmarks of rho(|whitened residual|)       rho: Cauchy
+    + sum over frames of |w_f|^2 / weight_sigma^2                    w in [0, 1]
+    + sum over frames of |second difference of pose and weights|^2   over their typical sizes
+
+Being symmetric in time, smoothing does not lag.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vermilion.storage.errors import InputError
+from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.observation import (
+    LandmarkNoise,
+    Observations,
+    pose_jacobian,
+    project,
+    projection_jacobian,
+    robust_cost,
+    robust_weights,
+    whitening,
+)
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess, in_chart, out_of_chart
+
+N_POSE = 6
+_FRAMES_AT_ONCE = 256
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """What is typical of landmarks, faces and heads; the same for everybody.
+
+    Attributes:
+        noise: of the landmarks.
+        weight_sigma: deviation of a blend weight about zero.
+        rotation_acceleration_deg, translation_acceleration_mm, weight_acceleration: typical
+            accelerations, per second squared; infinite switches smoothness off.
+        jaw_slide: how far the position along the jaw's line counts, 0 to 1.
+        iterations: of Gauss-Newton, at most.
+        tolerance_mm: stop when no landmark moves more.
+    """
+
+    noise: LandmarkNoise = field(default_factory=LandmarkNoise)
+    weight_sigma: float = 0.5
+    rotation_acceleration_deg: float = 400.0
+    translation_acceleration_mm: float = 600.0
+    weight_acceleration: float = 60.0
+    jaw_slide: float = 0.1
+    iterations: int = 15
+    tolerance_mm: float = 0.01
+
+    def smoothness(self, n_weights: int, fps: float) -> np.ndarray:
+        """(6 + K,) weights of squared second differences of pose and blend weights over time."""
+        typical = np.full(N_POSE + n_weights, float(self.weight_acceleration))
+        typical[:3] = np.radians(self.rotation_acceleration_deg)
+        typical[3:N_POSE] = self.translation_acceleration_mm
+        return (fps**2 / typical) ** 2
+
+
+@dataclass(frozen=True)
+class HeadMotion:
+    """Pose and expression of each frame.
+
+    Attributes:
+        rotation: (F, 3, 3) camera from head.
+        translation_mm: (F, 3).
+        weights: (F, K) in [0, 1].
+        reprojection_px: (F,) root mean square over the landmarks but the jaw's; NaN where the
+            landmarks were not found.
+    """
+
+    rotation: np.ndarray
+    translation_mm: np.ndarray
+    weights: np.ndarray
+    reprojection_px: np.ndarray
+
+
+def fit_motion(
+    shape: LandmarkShape,
+    seen: Observations,
+    focal_px: float,
+    fps: float,
+    settings: FitSettings | None = None,
+) -> HeadMotion:
+    """Fit all frames of a take. Frames without landmarks are interpolated.
+
+    Raises InputError where no frame has landmarks.
+    """
+    settings = settings or FitSettings()
+    problem = _TakeProblem(shape, seen, focal_px, fps, settings)
+    x = problem.first_guess()
+    cost = problem.cost(x)
+    for _ in range(settings.iterations):
+        target = problem.quadratic_minimum(x)
+        for scale in (1.0, 0.5, 0.25, 0.1):
+            trial = x + scale * (target - x)
+            trial_cost = problem.cost(trial)
+            if trial_cost <= cost:
+                break
+        else:
+            break
+        moved = problem.largest_move_mm(x, trial)
+        x, cost = trial, trial_cost
+        if moved < settings.tolerance_mm:
+            break
+    return problem.motion(x)
+
+
+class _TakeProblem:
+    """The energy above; unknowns x (F, 6 + K): rotation vector, translation, weights."""
+
+    def __init__(self, shape, seen, focal_px, fps, settings):
+        if not seen.valid.any():
+            raise InputError(
+                "no frame with landmarks",
+                "a face in at least one frame",
+                "Look at the landmark overlays; check the detector's settings.",
+            )
+        self.shape, self.seen, self.focal, self.settings = shape, seen, focal_px, settings
+        self.n_frames, self.n_weights = len(seen.image), shape.n_expressions
+        corners = shape.neutral_mm[[36, 45]]
+        self.interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
+        self.sigma_mm = settings.noise.per_landmark() * self.interocular_mm
+        self.prior = np.zeros(N_POSE + self.n_weights)
+        self.prior[N_POSE:] = settings.weight_sigma**-2.0
+        self.lower = np.concatenate([np.full(N_POSE, -np.inf), np.zeros(self.n_weights)])
+        self.upper = np.concatenate([np.full(N_POSE, np.inf), np.ones(self.n_weights)])
+        self.second, self.first = self._smoothness(fps)
+
+    def _smoothness(self, fps: float) -> tuple[np.ndarray, np.ndarray]:
+        strength = self.settings.smoothness(self.n_weights, fps)
+        valid = self.seen.valid
+        triples = valid[:-2] & valid[1:-1] & valid[2:]
+        # Across gaps: straight lines, which cannot overshoot.
+        pairs = ~(valid[:-1] & valid[1:])
+        floor = 1e-12
+        first = np.maximum(pairs[:, None] * np.maximum(strength, 1e-6), floor)
+        return triples[:, None] * strength, first
+
+    def first_guess(self) -> np.ndarray:
+        known = np.flatnonzero(self.seen.valid)
+        focal = np.full(len(known), self.focal)
+        rotation, translation, weights = first_guess(
+            self.shape, self.seen[known], self.sigma_mm, focal, self.settings.weight_sigma
+        )
+        # Fixed from here on: deviations that grew as the head came nearer would pull it nearer.
+        scale = fill_gaps(self.focal / translation[:, 2:], known, self.n_frames)
+        self.sigma_px = self.sigma_mm * scale
+        vectors, self.reference = in_chart(rotation)
+        values = np.concatenate([vectors, translation, weights], axis=1)
+        return fill_gaps(values, known, self.n_frames)
+
+    def _camera_points(self, x: np.ndarray) -> np.ndarray:
+        rotation = out_of_chart(x[:, :3], self.reference)
+        points = self.shape.points(x[:, N_POSE:])
+        return points @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
+
+    def cost(self, x: np.ndarray) -> float:
+        total = landmark_cost(
+            self._camera_points(x), self.seen, self.focal, self.sigma_px, self.settings
+        )
+        total += 0.5 * (self.prior * x**2).sum()
+        total += 0.5 * (self.first * np.diff(x, axis=0) ** 2).sum()
+        if self.n_frames > 2:
+            total += 0.5 * (self.second * np.diff(x, n=2, axis=0) ** 2).sum()
+        return float(total)
+
+    def quadratic_minimum(self, x: np.ndarray) -> np.ndarray:
+        """Minimum, within the box, of the energy's quadratic model at x."""
+        blocks, right = self._data_terms(x)
+        diagonal = np.arange(N_POSE + self.n_weights)
+        blocks[:, diagonal, diagonal] += self.prior
+        matrix = BandMatrix(blocks, self.second, self.first)
+        return solve_in_box(matrix, right, self.lower, self.upper, start=x)
+
+    def _data_terms(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        blocks, right = [], []
+        for begin in range(0, self.n_frames, _FRAMES_AT_ONCE):
+            frames = slice(begin, min(begin + _FRAMES_AT_ONCE, self.n_frames))
+            block, gradient = landmark_equations(
+                self.shape, self.seen[frames], self.focal, self.sigma_px[frames], self.reference,
+                x[frames], self.settings,
+            )  # fmt: skip
+            blocks.append(block)
+            right.append((block @ x[frames][..., None])[..., 0] - gradient)
+        return np.concatenate(blocks), np.concatenate(right)
+
+    def largest_move_mm(self, a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.linalg.norm(self._camera_points(a) - self._camera_points(b), axis=-1).max())
+
+    def motion(self, x: np.ndarray) -> HeadMotion:
+        image = project(self._camera_points(x), self.focal)
+        squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, 17:]
+        reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
+        rotation = out_of_chart(x[:, :3], self.reference)
+        return HeadMotion(rotation, x[:, 3:6].copy(), x[:, N_POSE:].copy(), reprojection)
+
+
+def landmark_cost(
+    points_mm: np.ndarray,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    settings: FitSettings,
+) -> float:
+    """Landmark term of the energy, the model's landmarks being at (F, 66, 3) in the camera frame."""
+    _, residual = _whitened(points_mm, seen, focal_px, sigma_px, settings)
+    return float(robust_cost(residual, settings.noise.robust_sigmas).sum())
+
+
+def landmark_equations(
+    shape: LandmarkShape,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    reference: np.ndarray,
+    x: np.ndarray,
+    settings: FitSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss-Newton matrices (F, P, P) and gradients (F, P) of the landmark term.
+
+    Args:
+        sigma_px: (F, 66).
+        reference: (3, 3), which the rotation vectors turn.
+        x: (F, P = 6 + K) rotation vector, translation, weights.
+    """
+    turned, by_rotation = pose_jacobian(x[:, :3], reference, shape.points(x[:, N_POSE:]))
+    points = turned + x[:, None, 3:6]
+    white, residual = _whitened(points, seen, focal_px, sigma_px, settings)
+    by_point = white @ projection_jacobian(points, focal_px)
+    by_head = by_point @ out_of_chart(x[:, :3], reference)[:, None]
+    by_weight = np.einsum("fnij,knj->fnik", by_head, shape.expressions_mm, optimize=True)
+    jacobian = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
+    jacobian = jacobian.reshape(len(x), -1, jacobian.shape[-1])
+    weight = np.repeat(robust_weights(residual, settings.noise.robust_sigmas), 2, axis=1)
+    weighted = jacobian * weight[..., None]
+    gradient = (residual.reshape(len(x), 1, -1) @ weighted)[:, 0]
+    return np.swapaxes(weighted, 1, 2) @ jacobian, gradient
+
+
+def _whitened(
+    points_mm: np.ndarray,
+    seen: Observations,
+    focal_px: float,
+    sigma_px: np.ndarray,
+    settings: FitSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whitening matrices (F, 66, 2, 2) and whitened residuals (F, 66, 2)."""
+    image = project(points_mm, focal_px)
+    white = whitening(image, sigma_px, seen.trust, settings.jaw_slide)
+    return white, (white @ (image - seen.image)[..., None])[..., 0]

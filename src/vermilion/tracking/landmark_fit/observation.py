@@ -1,0 +1,153 @@
+"""How a model's landmarks appear in the pictures: residuals, their derivatives, their trust."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vermilion.geometry.camera import Camera
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.scheme import BROWS, EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, NOSE
+from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
+
+
+@dataclass(frozen=True)
+class LandmarkNoise:
+    """Standard deviations of detected landmarks, as fractions of the inter-ocular distance.
+
+    `robust_sigmas`: a landmark this many deviations off counts half (Cauchy).
+    """
+
+    jaw: float = 0.05
+    brows: float = 0.03
+    nose: float = 0.02
+    eyes: float = 0.015
+    mouth: float = 0.015
+    robust_sigmas: float = 3.0
+
+    def per_landmark(self) -> np.ndarray:
+        """(66,)."""
+        sigma = np.empty(N_LANDMARKS)
+        for ids, value in (
+            (JAW, self.jaw),
+            (BROWS, self.brows),
+            (NOSE, self.nose),
+            (np.concatenate([EYE_LEFT, EYE_RIGHT]), self.eyes),
+            (MOUTH, self.mouth),
+        ):
+            sigma[ids] = value
+        return sigma
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Landmarks of frames relative to the principal point of an ideal pinhole camera.
+
+    Attributes:
+        image: (F, 66, 2) pixels from the principal point (zero where not valid).
+        trust: (F, 66) in [0, 1]; zero where not valid.
+        valid: (F,) bool.
+    """
+
+    image: np.ndarray
+    trust: np.ndarray
+    valid: np.ndarray
+
+    @classmethod
+    def of(cls, track: LandmarkTrack, camera: Camera) -> Observations:
+        """Undo the camera's distortion; x and y scaled to the x focal length."""
+        valid = track.valid & np.isfinite(track.points_px).all(axis=(1, 2))
+        pixels = np.where(valid[:, None, None], track.points_px, 0.5)
+        _, directions = camera.rays(pixels)
+        local = directions @ camera.rotation.T
+        image = focal_px(camera) * local[..., :2] / local[..., 2:3]
+        trust = np.clip(track.confidence, 0.0, 1.0) * valid[:, None]
+        return cls(np.where(valid[:, None, None], image, 0.0), trust, valid)
+
+    def __getitem__(self, frames: np.ndarray) -> Observations:
+        return Observations(self.image[frames], self.trust[frames], self.valid[frames])
+
+
+def focal_px(camera: Camera) -> float:
+    """The camera's x focal length."""
+    return float(camera.calibration[0, 0])
+
+
+def with_focal(camera: Camera, focal: float | None) -> Camera:
+    """The camera with another focal length, its ratio y to x kept; the same where it is None."""
+    if focal is None:
+        return camera
+    model = camera.colmap()
+    ratio = focal / focal_px(camera)
+    params = np.array(camera.params, dtype=np.float64)
+    params[model.focal_length_idxs()] *= ratio
+    return replace(camera, params=tuple(float(p) for p in params))
+
+
+def project(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
+    """Points (..., 3) in the camera frame to pixels from the principal point, (..., 2)."""
+    focal = np.asarray(focal)[..., None] if np.ndim(focal) else focal
+    return focal * points_mm[..., :2] / points_mm[..., 2:3]
+
+
+def projection_jacobian(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
+    """Derivative of `project` by the point, (..., 2, 3)."""
+    x, y, z = np.moveaxis(points_mm, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[1 / z, zero, -x / z**2], [zero, 1 / z, -y / z**2]]
+    jacobian = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.asarray(focal)[..., None, None] * jacobian
+
+
+def whitening(
+    points_px: np.ndarray, sigma_px: np.ndarray, trust: np.ndarray, jaw_slide: float
+) -> np.ndarray:
+    """Matrices (F, 66, 2, 2) that turn residuals into deviations.
+
+    Landmarks of the jaw slide along its line: only the part of the residual across it counts, the
+    part along it by `jaw_slide` (0 to 1).
+
+    Args:
+        points_px: (F, 66, 2) projected model landmarks.
+        sigma_px: (F, 66) deviations.
+        trust: (F, 66).
+    """
+    scale = np.sqrt(trust) / sigma_px
+    result = scale[..., None, None] * np.eye(2)
+    jaw = points_px[:, JAW]
+    tangent = np.empty_like(jaw)
+    tangent[:, 1:-1] = jaw[:, 2:] - jaw[:, :-2]
+    tangent[:, 0], tangent[:, -1] = jaw[:, 1] - jaw[:, 0], jaw[:, -1] - jaw[:, -2]
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), 1e-9)
+    along = tangent[..., :, None] * tangent[..., None, :]
+    result[:, JAW] = scale[:, JAW, None, None] * (np.eye(2) - (1 - jaw_slide) * along)
+    return result
+
+
+def pose_jacobian(
+    vectors: np.ndarray, reference: np.ndarray, points_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points turned by exp(v) @ reference, and their derivative by v.
+
+    Args:
+        vectors: (F, 3) rotation vectors.
+        reference: (3, 3) rotation.
+        points_mm: (F, N, 3) in the head frame.
+
+    Returns:
+        turned (F, N, 3); derivative (F, N, 3, 3).
+    """
+    rotation = rotation_of(vectors) @ reference
+    turned = points_mm @ np.swapaxes(rotation, 1, 2)
+    return turned, -cross_matrix(turned) @ left_jacobian(vectors)[:, None]
+
+
+def robust_weights(deviations: np.ndarray, limit: float) -> np.ndarray:
+    """Cauchy weights (F, 66) of whitened residuals (F, 66, 2)."""
+    return 1.0 / (1.0 + (deviations**2).sum(axis=-1) / limit**2)
+
+
+def robust_cost(deviations: np.ndarray, limit: float) -> np.ndarray:
+    """Cauchy cost (F, 66) of whitened residuals, whose weights `robust_weights` are."""
+    return 0.5 * limit**2 * np.log1p((deviations**2).sum(axis=-1) / limit**2)

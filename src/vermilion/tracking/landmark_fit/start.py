@@ -1,0 +1,78 @@
+"""A first guess: scaled orthographic pose and blend weights in turns (Mono13 6.2, eqs. 6 to 8)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vermilion.landmarks.scheme import JAW
+from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.observation import Observations
+from vermilion.tracking.landmark_fit.pose import (
+    mean_rotation,
+    rotation_of,
+    scaled_orthographic_pose,
+    vector_of,
+)
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
+
+
+def first_guess(
+    shape: LandmarkShape,
+    seen: Observations,
+    sigma: np.ndarray,
+    focal: np.ndarray,
+    weight_sigma: float,
+    rounds: int = 4,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pose and weights of the valid frames, each by itself.
+
+    Args:
+        shape: the person's landmarks.
+        seen: F frames, all valid.
+        sigma: (66,) deviations of the landmarks in millimetres at the head.
+        focal: (F,) pixels.
+        weight_sigma: deviation of the blend weights about zero.
+
+    Returns:
+        rotation (F, 3, 3) camera from head; translation (F, 3) mm; weights (F, K).
+    """
+    n_frames, n_weights = len(seen.image), shape.n_expressions
+    trust = seen.trust / sigma**2
+    trust[:, JAW] = 0.0  # a silhouette: no fixed points
+    weights = np.zeros((n_frames, n_weights))
+    none = np.zeros((0, n_weights))
+    for _ in range(rounds):
+        rotation, scale, centre = scaled_orthographic_pose(shape.points(weights), seen.image, trust)
+        basis = np.einsum("fij,knj->fnik", rotation[:, :2], shape.expressions_mm)
+        flat = shape.neutral_mm @ np.swapaxes(rotation[:, :2], 1, 2)
+        target = (seen.image - centre[:, None]) / scale[:, None, None] - flat
+        blocks = np.einsum("fn,fnik,fnil->fkl", trust, basis, basis, optimize=True)
+        blocks += np.eye(n_weights) / weight_sigma**2
+        right = np.einsum("fn,fnik,fni->fk", trust, basis, target, optimize=True)
+        for frame in range(n_frames):
+            matrix = BandMatrix(blocks[frame][None], none, none)
+            weights[frame] = solve_in_box(matrix, right[frame][None], 0.0, 1.0)[0]
+    # The scale holds at the depth of the points' mean, not of the head's origin.
+    share = (trust / trust.sum(axis=1, keepdims=True))[..., None]
+    mean = (share * shape.points(weights)).sum(axis=1)
+    depth = focal / scale - np.einsum("fj,fj->f", rotation[:, 2], mean)
+    translation = np.concatenate([centre / scale[:, None], depth[:, None]], axis=1)
+    return rotation, translation, weights
+
+
+def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarray:
+    """Values (M, P) of the frames `known` (M,) to all frames (n_frames, P): linear, ends held."""
+    every = np.arange(n_frames)
+    columns = [np.interp(every, known, column) for column in values.T]
+    return np.stack(columns, axis=1)
+
+
+def in_chart(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (M, 3, 3) as vectors (M, 3) about their mean: R = exp(v) @ mean."""
+    mean = mean_rotation(rotations)
+    return vector_of(rotations @ mean.T), mean
+
+
+def out_of_chart(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """The inverse of `in_chart`."""
+    return rotation_of(vectors) @ mean

@@ -1,0 +1,18 @@
+"""The make-up of a whole take as one video, and one picture of it."""
+
+import shutil
+
+from vermilion.export.overlay import join_videos
+from vermilion.storage.files import atomic_path
+from vermilion.storage.logfile import log_to
+
+
+def main(snakemake):
+    join_videos(snakemake.output.video, snakemake.input.videos)
+    with atomic_path(snakemake.output.picture) as temporary:
+        shutil.copyfile(snakemake.input.pictures[0], temporary)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,130 @@
+"""Read, calibrate or assume the cameras of a take; write them as COLMAP text with an overlay."""
+
+import json
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.capture.board import Board
+from vermilion.capture.manifest import load_manifest
+from vermilion.capture.overlay import (
+    calibration_sheet,
+    contact_sheet,
+    refinement_sheet,
+    worst_view,
+)
+from vermilion.capture.refine import RefineSettings, refine_cameras
+from vermilion.capture.rig import calibration_views, image_sizes, rig_cameras
+from vermilion.capture.tracks import MatchSettings, find_features
+from vermilion.config.capture import CalibrationConfig, RefinementConfig
+from vermilion.geometry.camera import write_cameras
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import read_image, write_srgb8
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_path
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+
+
+def wanted(cfg, rig):
+    """Whether a refinement is to be tried."""
+    methods = ("given", "charuco", "checkerboard") if cfg.board_calibrated else ("given",)
+    return cfg.mode != "off" and len(rig.cameras) > 1 and rig.method in methods
+
+
+def features_of(source, rig, frames, cfg):
+    """Frame -> camera -> features; pictures that cannot be read are left out."""
+    found = {}
+    for frame in progress(frames, "features"):
+        found[frame] = {}
+        for name in rig.cameras:
+            try:
+                picture = source.read(name, frame)
+            except InputError as error:
+                print(error)
+                continue
+            found[frame][name] = find_features(picture, cfg.contrast, cfg.max_features)
+    return found
+
+
+def refinement(cfg, rig, manifest, first, last):
+    """The rig refined over some frames, or as it was with the reason."""
+    frames = sorted({int(f) for f in np.linspace(first, last, cfg.frames).round()})
+    source = open_frames(manifest.source, manifest.subject, manifest.take)
+    values = cfg.model_dump()
+    matching, settings = (
+        kind(**{f.name: values[f.name] for f in fields(kind)})
+        for kind in (MatchSettings, RefineSettings)
+    )
+    pictures = features_of(source, rig, frames, cfg)
+    made = refine_cameras(rig.cameras, pictures, matching, settings, cfg.mode == "auto")
+    print(
+        f"refinement of the cameras {'applied' if made.applied else 'not applied'}: {made.reason}"
+    )
+    if cfg.mode == "on" and not made.applied:
+        raise InputError(
+            f"cameras that could not be refined ({made.reason})",
+            "features that many cameras share",
+            "Use more frames (`capture.refinement.frames`), check that the pictures are sharp and "
+            "the poses within `capture.refinement.gate_deg`, or set `capture.refinement.mode: auto`.",
+            subject=manifest.subject,
+            take=manifest.take,
+        )
+    return made
+
+
+def overlay(rig, manifest, neutral, made):
+    """Points of the refinement, the worst board view of each camera, or the neutral in each."""
+    if rig.calibration is not None:
+        folder = Path(manifest.source) / "calibration"
+        moments = {name: worst_view(rig.calibration, name) for name in rig.cameras}
+        views = {
+            name: {moment: read_image(calibration_views(folder, name)[moment])}
+            for name, moment in moments.items()
+        }
+        return calibration_sheet(rig.calibration, views)
+    source, pictures = open_frames(manifest.source, manifest.subject, manifest.take), {}
+    for name in rig.cameras:
+        try:
+            pictures[name] = source.read(name, neutral)
+        except InputError:
+            pictures[name] = None
+    if made is not None and made.shown and any(p is not None for p in pictures.values()):
+        return refinement_sheet(pictures, made.shown, made.moved)
+    return contact_sheet(pictures)
+
+
+def main(snakemake):
+    cfg = CalibrationConfig(**snakemake.params.cfg["capture.calibration"])
+    manifests = [load_manifest(path) for path in snakemake.input.manifests]
+    board = Board(
+        cfg.board, cfg.squares, cfg.square_mm, cfg.marker_mm, cfg.dictionary, cfg.legacy_pattern
+    )
+    rig = rig_cameras(
+        manifests[0].source,
+        image_sizes(manifests),
+        snakemake.params.camera,
+        board,
+        cfg.camera_model,
+        cfg.refine_principal_point,
+        cfg.max_view_px,
+        cfg.assumed_focal,
+        subject=snakemake.wildcards.subject,
+        take=snakemake.wildcards.take,
+    )
+    refine = RefinementConfig(**snakemake.params.cfg["capture.refinement"])
+    summary, made = rig.summary(), None
+    first, last = snakemake.params.frames
+    if wanted(refine, rig):
+        made = refinement(refine, rig, manifests[0], first, last)
+        summary["refinement"] = {"mode": refine.mode, **made.summary()}
+    write_srgb8(snakemake.output.overlay, overlay(rig, manifests[0], first, made))
+    with atomic_path(snakemake.output.summary) as temporary:
+        temporary.write_text(json.dumps(summary, indent=1, sort_keys=True) + "\n")
+    write_cameras(snakemake.output.cameras, made.cameras if made else rig.cameras)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,45 @@
+"""Check the pictures of a chunk; write its manifest, quality rows and a contact sheet."""
+
+from vermilion.capture.manifest import capture_manifest, quality_rows
+from vermilion.capture.overlay import contact_sheet
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import write_quality
+
+
+def first_pictures(manifest, frame):
+    """Camera -> linear picture of a frame, None where it cannot be read."""
+    source = open_frames(manifest.source, manifest.subject, manifest.take)
+    pictures = {}
+    for camera in manifest.cameras:
+        try:
+            pictures[camera] = source.read(camera, frame)
+        except InputError:
+            pictures[camera] = None
+    return pictures
+
+
+def main(snakemake):
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    frames = snakemake.params.frames
+    camera = snakemake.params.camera
+    manifest = capture_manifest(
+        snakemake.params.source,
+        subject,
+        take,
+        frames,
+        None if snakemake.params.multiview else [camera],
+        hash_decoded=snakemake.params.cfg["capture.manifest"]["hash_decoded"],
+    )
+    write_quality(
+        snakemake.output.quality, subject, take, "capture", quality_rows(manifest, frames, [camera])
+    )
+    write_srgb8(snakemake.output.overlay, contact_sheet(first_pictures(manifest, frames[0])))
+    manifest.save(snakemake.output.manifest)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

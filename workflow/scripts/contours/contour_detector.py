@@ -1,0 +1,107 @@
+"""Contour detectors of a take: trained on its labelled frames, or learnt along its tracked lips."""
+
+import numpy as np
+
+from vermilion.config.contours import ContourDetectorConfig
+from vermilion.contours.label_offset import without_lean
+from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+from vermilion.contours.maps import evenly
+from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
+from vermilion.contours.training import TrainingSettings, read_labelled, train_detector
+from vermilion.faces.model import FaceModel
+from vermilion.features.tracked_lips import TrackedLips
+from vermilion.imaging.frames import open_frames
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import locate, read_sequence
+from vermilion.tracking.result import TrackedTake
+
+
+class TrackedRings:
+    """The tracked lips of a take in its pictures."""
+
+    def __init__(self, inputs, landmarks: LandmarkTrack):
+        self.fit = TrackedTake.load(inputs.fit)
+        self.lips = TrackedLips.of(FaceModel.load(inputs.tracker))
+        self.coarse = inputs.coarse
+        served = landmarks.valid & np.isin(landmarks.frames, self.fit.frames[self.fit.valid])
+        self.frames = landmarks.frames[served].tolist()
+
+    def __call__(self, frame: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """Outer and inner ring (n, 2) px of a frame; None where it is not tracked."""
+        if frame not in self.frames:
+            return None
+        ((path, row),) = locate(self.coarse, [frame]).values()
+        return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
+
+
+def from_track(cfg, camera, source, track, rings):
+    """The detector that a take's own pictures and track tell; None where no frame serves."""
+    options = cfg.track
+    landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
+    detector = TrackRidgeDetector(
+        cfg.interocular_size_px,
+        cfg.margin,
+        cfg.ridge_width,
+        options.inner_reach,
+        cfg.edge_weight,
+        cfg.stiffness,
+        options.frame_reach,
+        options.lip_reach,
+    )
+    return learn_from_take(
+        detector,
+        sorted(evenly(rings.frames, options.frames)),
+        lambda frame: source.read(camera, frame),
+        landmarks.__getitem__,
+        rings,
+        options.reach,
+    )
+
+
+def main(snakemake) -> None:
+    cfg = ContourDetectorConfig(**snakemake.params.cfg["contours.detector"])
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    place, camera = {"subject": subject, "take": take}, snakemake.params.camera
+    source = open_frames(snakemake.params.source, **place)
+    track = LandmarkTrack.load(snakemake.input.landmarks)
+    labelled, rows, by_track = [], [], None
+    if cfg.kind in ("auto", "boosted"):
+        labelled, rows = read_labelled(
+            snakemake.params.capture,
+            camera,
+            source,
+            track,
+            required=cfg.kind == "boosted",
+            **place,
+        )
+    if cfg.kind in ("auto", "track"):
+        rings = TrackedRings(snakemake.input, track)
+        by_track = from_track(cfg, camera, source, track, rings)
+    if labelled and by_track:
+        limits = cfg.label_tolerance, cfg.label_reach
+        labelled, said = without_lean(labelled, by_track, rings, *limits)
+        rows += said
+    if labelled:
+        detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
+    else:
+        detector = by_track or LandmarkRidgeDetector(
+            cfg.interocular_size_px,
+            cfg.margin,
+            cfg.ridge_width,
+            cfg.ridge_reach,
+            cfg.edge_weight,
+            cfg.stiffness,
+        )
+    detector.save(snakemake.output.detector)
+    rows.sort(key=lambda row: row.frame)
+    write_quality(snakemake.output.quality, subject, take, "contour labels", rows)
+    print(f"{type(detector).__name__} from {len(labelled)} labelled frames")
+    for reason in sorted({row.reason for row in rows if row.reason}):
+        print(reason)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

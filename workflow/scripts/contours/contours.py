@@ -1,0 +1,60 @@
+"""Likelihood maps of the inner and outer lip contour of a chunk (Lips16 3.2.2)."""
+
+from vermilion.config.contours import ContourMapsConfig
+from vermilion.contours.detector import load_detector
+from vermilion.contours.labels import label_paths, read_label
+from vermilion.contours.maps import evenly, frame_maps, maps_overlay, sheet, write_maps
+from vermilion.faces.model import FaceModel
+from vermilion.features.tracked_lips import TrackedLips
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.files import atomic_folder
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import read_sequence
+from vermilion.tracking.result import TrackedTake
+
+
+def main(snakemake) -> None:
+    cfg = ContourMapsConfig(**snakemake.params.cfg["contours.maps"])
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    source = open_frames(snakemake.params.source, subject, take)
+    detector = load_detector(snakemake.input.detector)
+    track = LandmarkTrack.load(snakemake.input.landmarks)
+    labels = label_paths(snakemake.params.capture, snakemake.params.camera)
+    coarse = lips = camera = None
+    if detector.from_track:
+        coarse = read_sequence(snakemake.input.coarse[0])
+        lips = TrackedLips.of(FaceModel.load(snakemake.input.tracker))
+        camera = TrackedTake.load(snakemake.input.fit).camera
+    shown = evenly(track.frames.tolist(), cfg.overlay_frames)
+    rows, pictures = [], []
+    with atomic_folder(snakemake.output.maps) as folder:
+        for index, frame in enumerate(progress(track.frames.tolist(), "contour maps")):
+            points = track.points_px[index]
+            maps, picture, row = frame_maps(
+                source,
+                snakemake.params.camera,
+                frame,
+                points,
+                bool(track.valid[index]),
+                detector,
+                cfg.least_peak,
+                lips.rings_px(coarse[index], camera) if lips else None,
+            )
+            rows.append(row)
+            if maps is None:
+                continue
+            write_maps(folder / f"{frame:06d}.exr", *maps)
+            if frame in shown or frame in labels:
+                drawn = read_label(labels[frame]) if frame in labels else None
+                pictures.append(maps_overlay(picture, maps, points, frame, drawn))
+    write_quality(snakemake.output.quality, subject, take, "contours", rows)
+    write_srgb8(snakemake.output.overlay, sheet(pictures))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,58 @@
+"""The coarse meshes of a chunk corrected by six-frame flow, their residuals and a checkerboard."""
+
+from vermilion.detail.flow.chunk import correct_frames
+from vermilion.detail.flow.deformation import DeformationSettings
+from vermilion.detail.flow.frame import CorrectionSettings, FlowCorrection
+from vermilion.detail.flow.overlay import checkerboard_sheet
+from vermilion.detail.flow.six_frame_flow import FlowSettings
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import locate, read_sequence, write_sequence
+from vermilion.storage.tables import write_table
+from vermilion.tracking.result import TrackedTake
+
+
+def main(snakemake):
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    model, camera = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit).camera
+    source = open_frames(params.source, subject, take)
+    first, last = params.span
+    places = locate(inputs.coarse, range(first, last + 1))
+
+    def read_picture(frame):
+        return source.read(camera.name, frame)
+
+    def read_mesh(frame):
+        path, row = places[frame]
+        return read_sequence(path)[row]
+
+    settings = CorrectionSettings(
+        cfg["detail.face_px"],
+        FlowSettings(**cfg["detail.flow"]),
+        DeformationSettings(**cfg["detail.deformation"]),
+    )
+    correction = FlowCorrection(model, camera, read_picture(first), read_mesh(first), settings)
+    chunk = correct_frames(correction, params.frames, (first, last), read_picture, read_mesh)
+    before = [read_mesh(frame) for frame in params.frames]
+    picture = checkerboard_sheet(
+        read_picture, camera, model, params.frames, before, chunk.vertices_mm,
+        cfg["detail.overlay_frames"],
+    )  # fmt: skip
+    write_srgb8(snakemake.output.overlay, picture)
+    write_quality(snakemake.output.quality, subject, take, "detail", chunk.quality())
+    for path, values in (
+        (snakemake.output.start, chunk.before),
+        (snakemake.output.flow, chunk.after),
+    ):
+        rows = [{"frame": f, "residual": v} for f, v in zip(chunk.frames, values, strict=True)]
+        write_table(path, rows)
+    write_sequence(snakemake.output.meshes, chunk.vertices_mm)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

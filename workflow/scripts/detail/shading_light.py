@@ -1,0 +1,45 @@
+"""One light, albedo and noise of a take from its first frames, and the topology of its relief."""
+
+from vermilion.detail.relief.frames import Scene
+from vermilion.detail.relief.light import estimate_light
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.export.objs import write_obj
+from vermilion.faces.model import FaceModel
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+
+
+def main(snakemake):
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    model = FaceModel.load(inputs.tracker)
+    topology = FineTopology.of(model, cfg["detail.shading.levels"])
+    first, last = params.span
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    scene = Scene.open(topology, inputs, params.source, place, (first, last), cfg)
+    frames, seen = range(first, min(first + cfg["detail.shading.light_frames"], last + 1)), {}
+    for frame in frames:
+        try:
+            seen[frame] = scene.sight(frame, scene.fine(frame))
+        except (InputError, ValueError):  # no picture, or the face is not in it: the others tell
+            continue
+    if not any(sight.trust.any() for sight in seen.values()):
+        raise InputError(
+            f"no face in the frames {frames[0]} to {frames[-1]}",
+            "a first frame that shows the face",
+            "Begin the take where the face is seen, or raise detail.shading.light_frames.",
+            subject=place[0],
+            take=place[1],
+        )
+    smooth = scene.fine(first)
+    centres = smooth[topology.skin_ids][topology.skin].mean(axis=1)
+    light = estimate_light(
+        list(seen), list(seen.values()), topology, centres, cfg["detail.shading.detail_mm"]
+    )
+    light.save(snakemake.output.light)
+    uv = topology.finer @ model.uv
+    write_obj(snakemake.output.topology, smooth, topology.triangles, uv)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

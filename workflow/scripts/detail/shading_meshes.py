@@ -1,0 +1,93 @@
+"""Relief with its normals averaged over a window of frames: meshes, normal maps, residuals."""
+
+import numpy as np
+
+from vermilion.detail.relief.frames import (
+    ReliefReader,
+    Scene,
+    errors_of,
+    refined,
+    residual_of,
+)
+from vermilion.detail.relief.light import ClipLight
+from vermilion.detail.relief.normal_map import NormalMap
+from vermilion.detail.relief.overlay import relief_panels
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.draw import tile
+from vermilion.imaging.images import write_channels, write_srgb8
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import atomic_folder
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import QualityRow, write_quality
+from vermilion.storage.sequences import write_sequence
+from vermilion.storage.tables import write_table
+
+
+def main(snakemake):
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
+    topology = FineTopology.of(model, cfg["detail.shading.levels"])
+    first, last = params.span
+    own = params.frames[0], params.frames[-1]
+    scene = Scene.open(topology, inputs, params.source, place, own, cfg)
+    reader = ReliefReader(inputs.reliefs, range(first, last + 1))
+    maps = NormalMap(topology, model.uv, cfg["detail.shading.map_px"])
+    window, weight = cfg["detail.shading.window"], cfg["detail.shading.position_weight"]
+    count = min(cfg["detail.shading.overlay_frames"], len(params.frames))
+    shown = set(np.linspace(0, len(params.frames) - 1, count).round().astype(int).tolist())
+    meshes, quality, panels = [], [], []
+    with atomic_folder(snakemake.output.maps) as folder:
+        for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):
+            smooth = scene.fine(frame)
+            mesh = refined(topology, smooth, reader, frame, (first, last), window, weight)
+            drawn = maps.draw(smooth, mesh)
+            names = zip("RGB", np.moveaxis(drawn, 2, 0), strict=True)
+            write_channels(folder / f"{frame:06d}.exr", dict(names))
+            meshes.append(mesh)
+            row, picture, errors = residuals(scene, light, reader, frame, smooth, mesh)
+            quality.append(row)
+            if index in shown and picture is not None:
+                panels += relief_panels(
+                    f"{frame}", picture, scene.camera, topology, smooth, mesh, errors
+                )
+    blank = np.zeros((64, 256, 3), dtype=np.uint8)
+    write_srgb8(snakemake.output.overlay, tile(panels, 4) if panels else blank)
+    write_quality(snakemake.output.quality, *place, "shading", quality)
+    for name, path in (("before", snakemake.output.start), ("after", snakemake.output.after)):
+        rows = [
+            {
+                "frame": row.frame,
+                "residual": row.figures[f"residual_{name}"],
+                "learnt_from": int(row.frame in light.frames),
+            }
+            for row in quality
+        ]
+        write_table(path, rows)
+    write_sequence(snakemake.output.meshes, np.stack(meshes))
+
+
+def residuals(scene, light, reader, frame, smooth, mesh):
+    """Quality row of a frame, its picture (None without), and errors of the skin's triangles."""
+    relief = np.linalg.norm(mesh - smooth, axis=1).max()
+    figures = {"residual_before": np.nan, "residual_after": np.nan, "relief_mm": relief}
+    try:
+        picture = scene.read_picture(frame)
+        sight = scene.sight(frame, smooth)
+    except (InputError, ValueError):
+        return QualityRow(frame, False, reader.reason(frame) or "no picture", figures), None, None
+    before, after = (
+        errors_of(scene.topology, light, sight, m, scene.camera) for m in (smooth, mesh)
+    )
+    figures["residual_before"] = residual_of(before, sight.trust)
+    figures["residual_after"] = residual_of(after, sight.trust)
+    worse = figures["residual_after"] > figures["residual_before"]
+    reason = "the relief explains the picture worse" if worse else ""
+    return QualityRow(frame, True, reason, figures), picture, after
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

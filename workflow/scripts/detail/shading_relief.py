@@ -1,0 +1,29 @@
+"""Relief of each frame of a chunk from its shading."""
+
+from dataclasses import fields
+
+from vermilion.detail.relief.frames import Scene, relief_of
+from vermilion.detail.relief.light import ClipLight
+from vermilion.detail.relief.relief import ReliefSettings
+from vermilion.detail.relief.topology import FineTopology
+from vermilion.faces.model import FaceModel
+from vermilion.storage.logfile import log_to
+
+
+def main(snakemake):
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    topology = FineTopology.of(FaceModel.load(inputs.tracker), cfg["detail.shading.levels"])
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    span = (params.frames[0], params.frames[-1])
+    scene = Scene.open(topology, inputs, params.source, place, span, cfg)
+    settings = ReliefSettings(
+        **{f.name: cfg[f"detail.shading.{f.name}"] for f in fields(ReliefSettings)}
+    )
+    relief_of(scene, params.frames, ClipLight.load(inputs.light), settings).save(
+        snakemake.output.relief
+    )
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

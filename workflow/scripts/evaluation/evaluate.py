@@ -1,0 +1,222 @@
+"""Every regressor on the held-out frames of a take, against truth or against held-out H."""
+
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.baselines.contour_tracker import ContourTracker, FoundContours
+from vermilion.baselines.lip_shapes import LipShapes
+from vermilion.config.correction import CorrectionConfig
+from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
+from vermilion.correction.image_contours import (
+    PICTURE_ARRAYS,
+    Picture,
+    PictureSettings,
+    frames_around,
+)
+from vermilion.correction.neutral_pair import acquainted, neutral_pairs
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation import held_out
+from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
+from vermilion.evaluation.files import save_arrays, save_sums
+from vermilion.evaluation.lips import LipTolerances
+from vermilion.evaluation.masks import regions_of_mask
+from vermilion.evaluation.measures import measure_rows
+from vermilion.evaluation.reference import reference_of
+from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_errors
+from vermilion.evaluation.truth import read_curves, read_truth
+from vermilion.faces.model import FaceModel
+from vermilion.regression.model import load_model
+from vermilion.storage.chunks import read_chunks, read_frames
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import QualityRow, write_quality
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import write_table
+from vermilion.tracking.result import Identity, TrackedTake
+
+CONTOURS = ("outer_px", "inner_px", "outer_found", "inner_found")
+
+
+def tracked_frames(fit, asked, place):
+    """(F,) bool of the frames asked for; raises InputError where none was tracked."""
+    tracked = fit.valid[fit.index_of(asked)]
+    if not tracked.any():
+        raise InputError(
+            "no tracked frame among those held out",
+            "at least one",
+            "See the take's tracking overlay, or set its split to `none`.",
+            **place,
+        )
+    return tracked
+
+
+def reference(snakemake, tracker, correspondence, frames, place):
+    """Truth where it is given, else H, at the frames."""
+    inputs = snakemake.input
+    if not inputs.get("truth"):
+        vertices = read_frames(inputs.accurate, frames)
+        neutral = read_frames(inputs.accurate, [snakemake.params.first])[0]
+        where = held_out.points_on_h(correspondence)
+        return reference_of(
+            "H", where, vertices, correspondence.accurate_triangles, neutral, **place
+        )
+    (neutral,), triangles = read_truth(*inputs.neutral_truth, rows=np.array([0]), **place)
+    where = held_out.points_on_truth(
+        correspondence,
+        tracker,
+        FaceModel.load(inputs.template),
+        read_sequence(inputs.neutral_accurate)[0],
+        neutral,
+        triangles,
+        **ReferenceConfig(**snakemake.params.cfg["evaluation.reference"]).model_dump(),
+    )
+    sequence, _ = read_truth(*inputs.truth, rows=frames - snakemake.params.first, **place)
+    return reference_of("truth", where, sequence, triangles, neutral, **place)
+
+
+def true_curves(snakemake, frames, place):
+    """Expression weights of the frames, a dict each; None where they are not known."""
+    path = snakemake.input.get("curves")
+    return read_curves(path, frames - snakemake.params.first, **place) if path else None
+
+
+def coarse_take(inputs, tracker, fit, frames, correction, fps):
+    """The coarse track at the frames, with its features and what was found in the picture."""
+    rows = fit.index_of(frames)
+    features = read_chunks(inputs.features, frames, ["features", *PICTURE_ARRAYS])
+    settings = PictureSettings(**correction.picture.model_dump())
+    return CoarseTake(
+        frames,
+        np.asarray(read_frames(inputs.coarse, frames), dtype=np.float64),
+        tracker.triangles,
+        Identity.load(inputs.identity).neutral_mm,
+        fit.world_from_head_rotation[rows],
+        fit.world_from_head_translation_mm[rows],
+        np.where(features["valid"][:, None], features["features"], np.nan),
+        **correction.integration.at(fps),
+        picture=Picture.of(tracker, fit.camera, frames, features, settings),
+    )
+
+
+def oracle(inputs, correspondence, around, rows):
+    """Meshes by the true layers, and the layers, of the `rows` of a take; None without layers."""
+    if not inputs.get("layers"):
+        return None, None
+    layers = read_chunks(inputs.layers, around.frames, ["layers", "displacement_mm", "valid"])
+    meshes = corrected_by_truth(correspondence.mask, take=around, **layers)[rows]
+    true = held_out.TrueLayers(correspondence.mask, layers["layers"][rows], layers["valid"][rows])
+    return meshes, true
+
+
+def regressors(inputs, around, rows):
+    """Name -> what each model makes of the `rows` of a take; also told the neutrals that are known."""
+    regressed, pairs = {}, neutral_pairs(inputs)
+    for path in inputs.models:
+        name, model = measure_name(Path(path).stem), load_model(path)
+        take = around.as_in_paper() if name.endswith("/paper") else around
+        regressed[name] = held_out.Regressed.of(model, take, rows)
+        known = model if "/" in name else acquainted(model, around.triangles, *pairs)
+        if known is not model:
+            regressed[f"{name}/neutral"] = held_out.Regressed.of(known, take, rows)
+    return regressed
+
+
+def contour_track(inputs, tracker, fit, take, correspondence, contours, options):
+    """The baseline of Lips16 section 6: lip shapes of the training, fitted to the contours."""
+    shapes = LipShapes.load(inputs.shapes).on(
+        correspondence.coarse_neutral_mm, tracker.triangles, take.seam_mm
+    )
+    found, weights = FoundContours(**contours), fit.weights[fit.index_of(take.frames)]
+    fitted = ContourTracker(tracker, shapes, found.outer_px.shape[1], options.ridge)
+    return fitted.track(
+        take.coarse_mm, take.rotation, take.translation_mm, weights, fit.camera, found
+    )
+
+
+def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
+    """Sums by clip of every sequence: against the reference, in the picture, in the layers."""
+    found_px = contours["outer_px"], contours["inner_px"]
+    sums = {
+        name: result.sums[name]
+        + held_out.sums_of_contours(
+            sequence, take.coarse_mm, tracker, camera, *found_px, result.clips
+        )
+        for name, sequence in sequences.items()
+    }
+    for name, errors in layer_errors.items():
+        sums[name] += sums_of_layers(errors, result.clips)
+    return sums
+
+
+def main(snakemake):
+    inputs, out, cfg = snakemake.input, snakemake.output, snakemake.params.cfg
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
+    options = MeasuresConfig(**cfg["evaluation.measures"])
+    tracker, correspondence = (
+        FaceModel.load(inputs.tracker),
+        Correspondence.load(inputs.correspondence),
+    )
+    fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
+    tracked = tracked_frames(fit, asked, place)
+    frames = asked[tracked]
+    correction = CorrectionConfig(
+        integration=cfg["correction.integration"], picture=cfg["correction.picture"]
+    )
+    fps = snakemake.params.fps
+    near = frames_around(frames, fit.frames, correction.reach_frames(fps))
+    around = coarse_take(inputs, tracker, fit, near, correction, fps)
+    asked_of_near = np.searchsorted(near, frames)
+    take = around[asked_of_near]
+
+    by_truth, true = oracle(inputs, correspondence, around, asked_of_near)
+    regressed = regressors(inputs, around, asked_of_near)
+    contours = read_chunks(inputs.features, frames, CONTOURS)
+    baseline = contour_track(
+        inputs, tracker, fit, take, correspondence, contours,
+        ContourConfig(**cfg["evaluation.contour"]),
+    )  # fmt: skip
+    sequences = {"base": take.coarse_mm} | ({} if by_truth is None else {"oracle": by_truth})
+    sequences["contour"] = baseline
+    sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
+    regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
+    against = reference(snakemake, tracker, correspondence, frames, place)
+    result = evaluate_take(
+        sequences, frames, tracker, regions, against,
+        options.clip_frames, options.min_clips,
+        LipTolerances(options.touch_mm, options.gape_mm, options.through_mm),
+        true_curves(snakemake, frames, place),
+    )  # fmt: skip
+
+    layer_errors = {}
+    if true is not None:
+        layer_errors = {n: held_out.layer_errors(of, take, true) for n, of in regressed.items()}
+    sums = all_sums(result, sequences, take, tracker, fit.camera, contours, layer_errors)
+    save_sums(out.sums, sums, len(frames))
+    table = measure_rows(
+        sums, *place.values(), len(frames),
+        options.bootstrap_samples, options.confidence, options.seed,
+    )  # fmt: skip
+    print(table.to_string())
+    write_table(out.measures, table)
+    # Apart from the measures: seconds differ from run to run, and measures must not.
+    seconds = {name: of_model.seconds for name, of_model in regressed.items()}
+    write_table(
+        out.seconds, [{**place, "regressor": n, "seconds_per_frame": s} for n, s in seconds.items()]
+    )
+    write_table(out.frames, with_layer_errors(result.table, layer_errors))
+    mouth = regions.weights["mouth"] > 0
+    count = cfg["evaluation.figures.map_frames"]
+    maps = held_out.shown_arrays(
+        result, take, frames, count, against, correspondence.coarse_neutral_mm, mouth, tracker,
+        fit.camera,
+    )  # fmt: skip
+    save_arrays(out.maps, maps)
+    reasons = ["" if ok else "not tracked, so not measured" for ok in tracked]
+    rows = [QualityRow(int(f), not why, why) for f, why in zip(asked, reasons, strict=True)]
+    write_quality(out.quality, *place.values(), "evaluation", rows)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

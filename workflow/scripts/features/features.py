@@ -1,0 +1,73 @@
+"""Features of every frame of a chunk: shape coefficients and contour distances (Lips16 5.1)."""
+
+from pathlib import Path
+
+from vermilion.config.features import ContourFeaturesConfig, ShapeFeaturesConfig
+from vermilion.contours.maps import evenly, read_maps, sheet
+from vermilion.faces.model import FaceModel
+from vermilion.features.contour_features import ContourSampler
+from vermilion.features.overlay import contours_overlay
+from vermilion.features.search import SearchSettings
+from vermilion.features.shape_space import head_displacement, shape_space
+from vermilion.features.vector import FeatureTable, judge
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import read_sequence
+from vermilion.tracking.result import Identity, TrackedTake
+
+
+def main(snakemake) -> None:
+    shape_cfg = ShapeFeaturesConfig(**snakemake.params.cfg["features.shape"])
+    cfg = ContourFeaturesConfig(**snakemake.params.cfg["features.contours"])
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    model = FaceModel.load(snakemake.input.model)
+    fit = TrackedTake.load(snakemake.input.fit)
+    rows = fit.index_of(snakemake.params.frames)
+    coarse = read_sequence(snakemake.input.coarse)
+    displacement = head_displacement(
+        coarse,
+        fit.world_from_head_rotation[rows],
+        fit.world_from_head_translation_mm[rows],
+        Identity.load(snakemake.input.identity).neutral_mm,
+    )
+    space = shape_space(model, shape_cfg.variance)
+    print(f"{space.size} shape coefficients hold {space.kept:.2%} of the variance")
+    sampler = ContourSampler.of(model, cfg.samples, SearchSettings.of(cfg))
+    source = open_frames(snakemake.params.source, subject, take)
+    shown = evenly(list(snakemake.params.frames), cfg.overlay_frames)
+    contours, quality, pictures = [], [], []
+    for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):
+        path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
+        row = rows[index]
+        maps = read_maps(path, frame=frame) if path.exists() else None
+        pose = (fit.world_from_head_rotation[row], fit.world_from_head_translation_mm[row])
+        pose = pose if cfg.space == "head" else None
+        found = sampler.find(coarse[index], fit.camera, maps, pose)
+        tracked = bool(fit.valid[row])
+        contours.append(found)
+        quality.append(judge(frame, found, tracked, maps is not None, cfg.least_found))
+        if frame in shown:
+            try:
+                picture = source.read(snakemake.params.camera, frame)
+            except InputError:
+                continue
+            pictures.append(contours_overlay(picture, found, frame))
+    table = FeatureTable.of(
+        snakemake.params.frames,
+        space.coefficients(displacement),
+        contours,
+        [entry.valid for entry in quality],
+        cfg.space,
+    )
+    table.save(snakemake.output.features)
+    write_quality(snakemake.output.quality, subject, take, "features", quality)
+    write_srgb8(snakemake.output.overlay, sheet(pictures, columns=5))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,28 @@
+"""Train the landmark regressor on the labelled frames of some takes."""
+
+from vermilion.imaging.draw import tile, to_display
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detect import draw_landmarks
+from vermilion.landmarks.labels import read_labels
+from vermilion.landmarks.training import TrainingSettings, labelled_pictures, train_descent
+from vermilion.storage.logfile import log_to
+
+
+def main(snakemake):
+    settings = TrainingSettings(**snakemake.params.cfg["landmarks.training"])
+    labels, sources = [], {}
+    for take in snakemake.params.takes:
+        name = (take["subject"], take["take"])
+        sources[name] = open_frames(take["source"], *name)
+        labels += [(sources[name], label) for label in read_labels(take["source"])]
+    pictures, points = labelled_pictures(labels, settings.max_frames)
+    detector = train_descent(pictures, points, settings)
+    drawn = [draw_landmarks(to_display(p), detector.detect(p)) for p in pictures[:12]]
+    write_srgb8(snakemake.output.overlay, tile(drawn, 4))
+    detector.save(snakemake.output.model)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

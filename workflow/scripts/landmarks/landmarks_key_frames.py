@@ -1,0 +1,44 @@
+"""Key frames of a take: given ones, and those chosen by local binary patterns, settled by flow."""
+
+from vermilion.imaging.frames import open_frames
+from vermilion.landmarks.correct_key_frames import settle
+from vermilion.landmarks.correction import CorrectionSettings
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.gradients import grey_of
+from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
+from vermilion.landmarks.labels import labels_by_frame
+from vermilion.landmarks.table import read_landmark_csv
+from vermilion.storage.logfile import log_to
+from vermilion.storage.tables import write_table
+
+
+def main(snakemake):
+    cfg, camera = snakemake.params.cfg["landmarks.key_frames"], snakemake.params.camera
+    source = open_frames(
+        snakemake.params.source, snakemake.wildcards.subject, snakemake.wildcards.take
+    )
+    track = LandmarkTrack.load(list(snakemake.input.landmarks))
+    given = {}
+    for path in snakemake.input.csv:
+        settings = {k: v for k, v in cfg["csv"].items() if k != "path"}
+        found = read_landmark_csv(path, **settings).by_frame
+        given |= {frame: entry.points_px for frame, entry in found.items()}
+    given |= labels_by_frame(snakemake.input.labels)  # a person is right where both speak
+    track = without_offset(track, given)
+
+    def read_grey(frame):
+        return grey_of(source.read(camera, frame))
+
+    keys = find_key_frames(
+        read_grey, track, given, settings=KeyFrameSettings(cfg["share"], cfg["max_clip"])
+    )
+    correction = snakemake.params.cfg["landmarks.correction"]
+    keys = settle(read_grey, track, keys, CorrectionSettings.of(correction))
+    print(f"{len(keys.frames)} key frames of {len(track.frames)} frames")
+    write_table(snakemake.output.table, keys.table())
+    keys.save(snakemake.output.key_frames)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

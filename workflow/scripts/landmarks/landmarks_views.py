@@ -1,0 +1,47 @@
+"""Landmarks of the neutral in every camera of a rig, with an overlay."""
+
+from pathlib import Path
+
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.draw import label, tile, to_display
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.choose import open_detector
+from vermilion.landmarks.detect import draw_landmarks
+from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.table import read_landmark_csv
+from vermilion.landmarks.views import LandmarkViews
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+
+
+def main(snakemake):
+    cfg, frame = snakemake.params.cfg, snakemake.params.frame
+    source = open_frames(
+        snakemake.params.source, snakemake.wildcards.subject, snakemake.wildcards.take
+    )
+    kind, detector = cfg["landmarks.detector"], None
+    if kind != "csv":
+        detector = open_detector(kind, snakemake.params.model, cfg["landmarks.networks"])
+    found, pictures = {}, []
+    for camera in read_cameras(snakemake.input.cameras):
+        found[camera] = Landmarks.none()
+        try:
+            picture = source.read(camera, frame)
+        except InputError as error:
+            print(error)
+            continue
+        path = Path(snakemake.params.csv.format(camera=camera))
+        if detector is not None:
+            found[camera] = detector.detect(picture)
+        elif path.is_file():
+            settings = {k: v for k, v in cfg["landmarks.csv"].items() if k != "path"}
+            found[camera] = read_landmark_csv(path, **settings).at(frame)
+        pictures.append(label(draw_landmarks(to_display(picture), found[camera]), camera))
+    write_srgb8(snakemake.output.overlay, tile(pictures, 5))
+    LandmarkViews.of(found).save(snakemake.output.views)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,45 @@
+"""Drift of a chunk's frames against the neutral: drift/{chunk}.tsv."""
+
+import cv2
+
+from vermilion.config.multiview import DriftConfig, ImageConfig
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.frames import open_frames
+from vermilion.multiview.drift import DriftSettings, Origin, carry, drift_rows, unread_row
+from vermilion.multiview.files import read_neutral
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.take import ImageSettings, Pictures
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import write_table
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg, frames = snakemake.params.cfg, snakemake.params.frames
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
+    model = FaceModel.load(snakemake.input.template)
+    source = open_frames(snakemake.params.source, **place)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
+    origin = Origin.of(pictures.load(snakemake.params.neutral, settings.scale), neutral, model)
+    meshes, matcher, rows = read_sequence(snakemake.input.meshes), FlowMatcher(), []
+    for number, mesh in progress(zip(frames, meshes, strict=True), "drift", len(frames)):
+        try:
+            frame = pictures.load(number, settings.scale)
+        except InputError as error:
+            rows.append(unread_row(number, str(error)))
+            continue
+        carried = carry(origin, frame, mesh, matcher, settings)
+        rows += drift_rows(origin, frame, carried, settings.scale)
+    write_table(snakemake.output.drift, [{**place, **row} for row in rows])
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,84 @@
+"""The template registered to the first frame of a take: neutral, point cloud, overlay."""
+
+import cv2
+import numpy as np
+
+from vermilion.config.multiview import ImageConfig, NeutralConfig, RefineConfig, StereoConfig
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.mesh import unique_edges
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.multiview.cloud import write_cloud
+from vermilion.multiview.files import read_neutral, read_views, write_neutral
+from vermilion.multiview.neutral import NeutralSettings, StereoSettings, register_neutral
+from vermilion.multiview.overlay import neutral_sheet
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.register_to_first_take import with_points_of
+from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.multiview.triangulate import triangulate_landmarks
+from vermilion.storage.logfile import log_to
+from vermilion.storage.sequences import write_ply
+
+
+def refiner_of_first_take(snakemake, images, stereo, model):
+    """What registers pictures to the neutral of the person's first take."""
+    first = snakemake.params.first
+    source = open_frames(first["source"], snakemake.wildcards.subject, first["take"])
+    pictures = Pictures(source, read_cameras(snakemake.input.first_cameras), images)
+    neutral = read_neutral(snakemake.input.first_neutral, model.n_vertices)
+    settings = RefineSettings(**RefineConfig(**first["cfg"]["multiview.refine"]).model_dump())
+    return Refiner(pictures, model, first["frame"], neutral, stereo, settings, FlowMatcher())
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg = snakemake.params.cfg
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
+    neutral = NeutralConfig(**cfg["multiview.neutral"]).model_dump(exclude={"same_points"})
+    limits = {name: neutral.pop(name) for name in ("min_confidence", "landmark_distance_mm")}
+    model = FaceModel.load(snakemake.input.template)
+    cameras = read_cameras(snakemake.input.cameras)
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    source = open_frames(snakemake.params.source, subject, take)
+    frame = Pictures(source, cameras, images).load(snakemake.params.frame)
+    names, points, confidence = read_views(snakemake.input.landmarks, frame.views)
+    landmarks = triangulate_landmarks(
+        cameras,
+        names,
+        points,
+        confidence,
+        min_confidence=limits["min_confidence"],
+        max_distance_mm=limits["landmark_distance_mm"],
+    )
+    found = register_neutral(
+        frame, model, landmarks, stereo, NeutralSettings(**neutral), FlowMatcher()
+    )
+    print(f"{int(landmarks.valid.sum())} landmarks, {len(found.cloud)} points")
+    if snakemake.params.first:
+        first = refiner_of_first_take(snakemake, images, stereo, model)
+        name = snakemake.params.first["take"]
+        found, why = with_points_of(first, name, frame, found)
+        if why:
+            print(
+                f"WARNING: {subject}/{take}: found {why} between its neutral and that of {name}; "
+                f"expected pictures that match. Its own fit is kept, whose vertices may lie elsewhere "
+                f"on the skin than those of {name}. Look at both neutrals' overlays."
+            )
+        else:
+            moved = np.percentile(found.moved_mm, (50, 95))
+            print(
+                f"moved to the points of {name}: {moved[0]:.2f} mm median, {moved[1]:.2f} mm 95 %"
+            )
+    print(f"seen by a pair: {np.mean(found.information > 0):.0%} of the vertices")
+    write_neutral(snakemake.output.neutral, found)
+    write_cloud(snakemake.output.cloud, found.cloud)
+    write_ply(snakemake.output.surface, found.surface)
+    sheet = neutral_sheet(frame, found, model.triangles, unique_edges(model.triangles))
+    write_srgb8(snakemake.output.overlay, sheet)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

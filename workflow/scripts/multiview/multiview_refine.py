@@ -1,0 +1,60 @@
+"""The frames of a chunk registered to the neutral: meshes, visibility, quality, overlay."""
+
+import cv2
+import numpy as np
+
+from vermilion.config.multiview import ImageConfig, RefineConfig, StereoConfig
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.mesh import unique_edges
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.multiview.files import read_neutral, read_track
+from vermilion.multiview.neutral import StereoSettings
+from vermilion.multiview.overlay import frames_sheet
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.storage.files import atomic_path
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import write_sequence
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg, frames = snakemake.params.cfg, snakemake.params.frames
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
+    settings = RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump())
+    model = FaceModel.load(snakemake.input.template)
+    source = open_frames(snakemake.params.source, subject, take)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
+    coarse = read_track(snakemake.input.track, frames)
+    refiner = Refiner(
+        pictures, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
+    )
+    drawn = {frames[i] for i in np.linspace(0, len(frames) - 1, 3).astype(int)}
+    meshes, seeing, rows, shown = [], [], [], []
+    for number, start in progress(zip(frames, coarse, strict=True), "multiview", len(frames)):
+        found = refiner.refine(number, start)
+        meshes.append(found.registered.vertices_mm.astype(np.float32))
+        seeing.append(found.registered.cameras_seeing)
+        rows.append(found.quality)
+        if number in drawn and found.quality.valid:
+            shown.append((pictures.load(number), found))
+    write_sequence(snakemake.output.meshes, np.array(meshes))
+    with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
+        np.save(stream, np.array(seeing))
+    write_quality(snakemake.output.quality, subject, take, "multiview", rows)
+    write_srgb8(
+        snakemake.output.overlay,
+        frames_sheet(shown, model.triangles, unique_edges(model.triangles)),
+    )
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

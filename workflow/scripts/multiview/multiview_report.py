@@ -1,0 +1,93 @@
+"""The report page of a take: report.html; and the drift of all its frames: drift.tsv."""
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from vermilion.config.multiview import (
+    DriftConfig,
+    ImageConfig,
+    RefineConfig,
+    ReportConfig,
+    StereoConfig,
+)
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.frames import open_frames
+from vermilion.multiview.drift import DriftSettings
+from vermilion.multiview.files import read_anchors, read_neutral
+from vermilion.multiview.neutral import StereoSettings
+from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.take import ImageSettings, Pictures, RefineSettings
+from vermilion.report.multiview_page import Findings, choose_frames, join_frames, report_page
+from vermilion.report.multiview_sheets import SheetSettings
+from vermilion.report.multiview_take_sheets import TakeSheets
+from vermilion.storage.files import atomic_path
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.storage.sequences import locate, read_sequence
+from vermilion.storage.tables import read_table, write_table
+
+
+def joined(paths):
+    """Tables of the chunks as one; empty without chunks."""
+    return pd.concat([read_table(path) for path in paths] or [pd.DataFrame()], ignore_index=True)
+
+
+def rows_at(paths, frames, read):
+    """Frame number -> its row of the chunk files, where there is one."""
+    return {frame: read(path)[row] for frame, (path, row) in locate(paths, frames).items()}
+
+
+def main(snakemake):
+    cv2.setNumThreads(1)
+    cfg, inputs = snakemake.params.cfg, snakemake.input
+    place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
+    report = ReportConfig(**cfg["multiview.report"])
+    drift_settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
+    model = FaceModel.load(inputs.template)
+    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    pictures = Pictures(
+        open_frames(snakemake.params.source, **place), read_cameras(inputs.cameras), images
+    )
+    sheets = TakeSheets(
+        pictures,
+        model,
+        snakemake.params.neutral,
+        read_neutral(inputs.neutral, model.n_vertices, **place),
+        StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump()),
+        RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump()),
+        drift_settings,
+        SheetSettings(report.picture_px, report.residual_px, report.cloud_mm, drift_settings.scale),
+        FlowMatcher(),
+    )
+    drift, frames = joined(inputs.drift), pd.DataFrame()
+    if len(drift):
+        _, similarity, anchors = read_anchors(inputs.track[0])
+        frames = join_frames(joined(inputs.quality), drift, similarity, anchors)
+    why = choose_frames(
+        frames, snakemake.params.neutral, report.spaced_frames, report.flagged_frames
+    )
+    meshes = rows_at(inputs.meshes, why, read_sequence)
+    seeing = rows_at(inputs.visibility, why, lambda path: np.load(path, mmap_mode="r"))
+    shown = [
+        sheets.draw(number, reason, meshes.get(number), seeing.get(number))
+        for number, reason in progress(list(why.items()), "sheets")
+    ]
+    found = Findings(
+        "/".join(place.values()),
+        snakemake.params.neutral,
+        sorted(pictures.cameras),
+        frames,
+        drift,
+        sheets.across_rows(),
+    )
+    columns = ["subject", "take", *found.across.columns]
+    write_table(snakemake.output.drift, drift if len(drift) else pd.DataFrame(columns=columns))
+    with atomic_path(snakemake.output.page) as temporary:
+        temporary.write_text(report_page(found, shown, report.page_mb), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

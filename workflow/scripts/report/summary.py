@@ -1,0 +1,72 @@
+"""Every result on one HTML page that opens offline."""
+
+import os
+from pathlib import Path
+
+import pandas as pd
+
+from vermilion.report.summary import (
+    FRAME_COLUMNS,
+    REGRESSOR_COLUMNS,
+    Findings,
+    Overlay,
+    summary_page,
+)
+from vermilion.storage.files import atomic_path
+from vermilion.storage.logfile import log_to
+from vermilion.storage.tables import read_table
+
+
+def settings(cfg):
+    """The configuration that the figures depend on, as (dotted key, value) pairs."""
+    rows = []
+    for key, value in cfg.items():
+        if isinstance(value, dict):
+            rows += settings({f"{key}.{name}": item for name, item in value.items()})
+        else:
+            rows.append((key, str(value)))
+    return rows
+
+
+def main(snakemake):
+    inputs, names, cfg = snakemake.input, snakemake.params.names, dict(snakemake.params.cfg)
+    limit_mb = cfg.pop("evaluation.figures.embed_video_mb")
+
+    def named(kind, paths):
+        return [(name, Path(path)) for name, path in zip(names[kind], paths, strict=True)]
+
+    found = Findings(
+        measures=read_table(inputs.measures),
+        table1=read_table(inputs.table1),
+        kinds=read_table(inputs.kinds),
+        flagged=read_table(inputs.quality),
+        comparisons=read_table(inputs.comparisons),
+        table2=read_table(inputs.table2),
+        table3=read_table(inputs.table3),
+        estimators=read_table(inputs.estimators),
+        configured=cfg["training"]["regressor"],
+        table1_picture=Path(inputs.picture),
+        figure16=Path(inputs.figure16),
+        renders=named("maps", inputs.renders),
+        stretch=named("maps", inputs.stretch),
+        reconstructions=[
+            (name, os.path.relpath(path, Path(snakemake.output.page).parent))
+            for name, path in zip(names["reconstructions"], inputs.reconstructions, strict=True)
+        ],
+        error_maps=named("maps", inputs.maps),
+        over_time=named("maps", inputs.curves),
+        curve_pictures=named("training", inputs.training),
+        overlays=[Overlay(*what, path) for what, path in named("overlays", inputs.overlays)],
+        videos=named("videos", inputs.videos),
+        timelines=named("videos", inputs.timelines),
+        frames=pd.DataFrame(snakemake.params.frames, columns=list(FRAME_COLUMNS)),
+        regressors=pd.DataFrame(snakemake.params.regressors, columns=list(REGRESSOR_COLUMNS)),
+        settings=settings(cfg),
+    )
+    with atomic_path(snakemake.output.page) as temporary:
+        temporary.write_text(summary_page(found, limit_mb), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

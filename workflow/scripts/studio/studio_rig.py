@@ -1,0 +1,21 @@
+"""Cameras, labels and truth of a synthetic take."""
+
+from pathlib import Path
+
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import write_cameras
+from vermilion.storage.logfile import log_to
+from vermilion.studio.capture_writer import write_labels, write_truth
+from vermilion.studio.take import cameras_of, plan_of
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    cfg = snakemake.params.cfg
+    plan = plan_of(FaceModel.load(snakemake.input.model), **cfg["plan"])
+    cameras = cameras_of(plan, cfg["plan"]["role"], **cfg["cameras"])
+    folder = Path(snakemake.output.cameras[0]).parent
+    write_cameras(folder, cameras)
+    write_labels(
+        plan, cameras, folder.parent, cfg["plan"]["first"], cfg["contours"], cfg["landmarks"]
+    )
+    write_truth(plan, Path(snakemake.output.truth[0]).parent)

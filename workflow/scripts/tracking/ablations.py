@@ -1,0 +1,25 @@
+"""The residuals of all takes and steps as one table."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from vermilion.storage.logfile import log_to
+from vermilion.storage.tables import read_table, write_table
+from vermilion.tracking.image_fit.ablations import ablation_rows
+
+
+def main(snakemake):
+    parts = []
+    for path in map(Path, snakemake.input.tables):
+        # .../takes/<subject>/<take>/tracking/residuals/<step>/<chunk>.tsv
+        subject, take = path.parts[-6:-4]
+        rows = read_table(path, ["frame", "residual"])
+        parts.append(rows.assign(subject=subject, take=take, step=path.parent.name))
+    table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+    write_table(snakemake.output.table, ablation_rows(table))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,25 @@
+"""The identity of a subject from landmarks of sampled frames of its takes."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.storage.logfile import log_to
+from vermilion.tracking.identity.landmark_identity import fit_identity
+from vermilion.tracking.identity.sampling import sample_takes
+from vermilion.tracking.result import Identity
+from vermilion.tracking.settings import identity_settings
+
+
+def main(snakemake):
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    tracker = FaceModel.load(inputs.tracker)
+    count = cfg["tracking.identity"]["frames"]
+    found = sample_takes(params.takes, inputs.landmarks, inputs.cameras, inputs.calibration, count)
+    samples = [part.sample for part in found]
+    settings = identity_settings(cfg["tracking.fit"], cfg["tracking.identity"])
+    fit = fit_identity(tracker, samples, settings)
+    print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
+    Identity.of(fit, tracker, samples).save(snakemake.output.identity)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

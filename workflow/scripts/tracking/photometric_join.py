@@ -1,0 +1,26 @@
+"""The refined frames of a take, smooth over time, as the track that all later stages use."""
+
+from dataclasses import replace
+
+from vermilion.storage.chunks import read_chunks
+from vermilion.storage.logfile import log_to
+from vermilion.tracking.image_fit.join import join_frames
+from vermilion.tracking.image_fit.take import TakeStart
+
+
+def main(snakemake):
+    inputs, cfg = snakemake.input, snakemake.params.cfg
+    fit, _, start = TakeStart.load(inputs, cfg)
+    names = ["x", "matrix", "right", "refined"]
+    found = read_chunks(inputs.chunks, fit.frames, names)
+    # Pictures tell weights and depth with more noise than landmarks do: so they are smoothed more.
+    smooth = replace(start.settings, **cfg["refinement.join"])
+    x = join_frames(
+        found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth
+    )
+    start.with_motion(fit, x).save(snakemake.output.fit)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,70 @@
+"""The identity of a subject from landmarks and pictures of sampled frames of its takes."""
+
+from dataclasses import fields
+
+import numpy as np
+
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.draw import tile
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.storage.logfile import log_to
+from vermilion.storage.progress import progress
+from vermilion.tracking.identity.joint_identity import PictureSettings, fit_joint_identity
+from vermilion.tracking.identity.landmark_identity import IdentityProblem
+from vermilion.tracking.identity.sampling import sample_takes
+from vermilion.tracking.image_fit.overlay import residual_sheet
+from vermilion.tracking.image_fit.residual import photometric_residual
+from vermilion.tracking.result import Identity
+from vermilion.tracking.settings import identity_settings
+
+STEPS = ("landmarks", "with pictures")
+#: Frames of the overlay: no key, as another number would make all that follows the identity again.
+SHOWN = 4
+
+
+def main(snakemake):
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    options, subject = cfg["tracking.identity"], snakemake.wildcards.subject
+    tracker = FaceModel.load(inputs.tracker)
+    found = sample_takes(
+        params.takes, inputs.landmarks, inputs.cameras, inputs.calibration, options["frames"]
+    )
+    samples = [part.sample for part in found]
+    sources = {
+        row["take"]: open_frames(row["source"], subject, row["take"]) for row in params.takes
+    }
+    wanted = [(part, int(frame)) for part in found for frame in part.frames]
+    pictures = [
+        sources[part.sample.name].read(part.camera.name, frame)
+        for part, frame in progress(wanted, "pictures")
+    ]
+    names = {field.name for field in fields(PictureSettings)}
+    joint = fit_joint_identity(
+        tracker,
+        IdentityProblem(tracker, samples, identity_settings(cfg["tracking.fit"], options)),
+        pictures,
+        [part.camera for part, _ in wanted],
+        PictureSettings(**{k: v for k, v in options["pictures"].items() if k in names}),
+    )
+    sheets, residuals = [], []
+    for (part, frame), picture, states in zip(wanted, pictures, joint.sheet, strict=True):
+        each = [photometric_residual(errors, trust) for errors, trust, _ in states]
+        labels = [f"{step} {value:.2f}" for step, value in zip(STEPS, each, strict=True)]
+        row = [(text, *state) for text, state in zip(labels, states, strict=True)]
+        residuals.append(each)
+        sheets.append(((f"{part.sample.name} {frame}", picture, row), part.camera))
+    before, after = np.mean(residuals, axis=0)
+    fit = joint.person
+    print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
+    print(f"residual {before:.2f} to {after:.2f} display values, {len(wanted)} frames")
+    count = min(SHOWN, len(sheets))
+    shown = np.linspace(0, len(sheets) - 1, count).round().astype(int)
+    rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in np.unique(shown)]
+    write_srgb8(snakemake.output.overlay, tile(rows, 1))
+    Identity.of(fit, tracker, samples).save(snakemake.output.identity)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,70 @@
+"""What each step of the track leaves unexplained of a chunk's pictures, as tables and pictures."""
+
+import numpy as np
+
+from vermilion.appearance.estimate import Appearance
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.errors import InputError
+from vermilion.storage.logfile import log_to
+from vermilion.storage.sequences import read_sequence
+from vermilion.storage.tables import write_table
+from vermilion.tracking.image_fit.overlay import residual_sheet
+from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
+from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.settings import fit_settings
+
+
+def main(snakemake):
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
+    tracker, person = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
+    track, appearance = LandmarkTrack.load(inputs.landmarks), Appearance.load(inputs.appearance)
+    settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+    steps, starts = params.steps, {}
+    for step in steps:
+        fit = TrackedTake.load(inputs.landmark_fit if step == "landmarks" else inputs.fit)
+        rows = fit.index_of(params.frames)
+        starts[step] = TakeStart.of(tracker, person, fit, track, settings, rows)
+    face = starts["landmarks"].face(appearance.samples)
+    moved = np.zeros((len(rows), tracker.n_vertices, 3))
+    if "layer" in steps:
+        moved = read_sequence(inputs.offsets)
+    at = appearance.samples.matrix(tracker.triangles, tracker.n_vertices)
+    source = open_frames(params.source, *place)
+    count = min(cfg["refinement.overlay_frames"], len(rows))
+    shown = set(np.linspace(0, len(rows) - 1, count).round().astype(int).tolist())
+    tables, sheet = {step: [] for step in steps}, []
+    for index, frame in enumerate(params.frames):
+        try:
+            picture = source.read(fit.camera.name, int(frame)) if fit.valid[rows[index]] else None
+        except InputError:
+            picture = None
+        results = []
+        for step, start in starts.items():
+            row = {
+                "frame": frame,
+                "residual": np.nan,
+                "learnt_from": int(frame in appearance.frames),
+            }
+            if picture is not None:
+                pixel_mm = cfg["refinement.appearance"]["pixel_mm"]
+                view = start.view(index, picture, face, pixel_mm, 1)
+                offsets = at @ moved[index] if step == "layer" else 0.0
+                errors, trust, image = sample_errors(view, view.start, face, appearance, offsets)
+                row["residual"] = photometric_residual(errors, trust)
+                results.append((f"{step} {row['residual']:.2f}", errors, trust, image))
+            tables[step].append(row)
+        if picture is not None and index in shown:
+            sheet.append((f"{frame}", picture, results))
+    write_srgb8(snakemake.output.overlay, residual_sheet(sheet, fit.camera))
+    for step, path in zip(steps, snakemake.output.tables, strict=True):
+        write_table(path, tables[step])
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,22 @@
+"""The topology of a mesh sequence that another tracker made."""
+
+from vermilion.geometry.mesh import Mesh
+from vermilion.storage.logfile import log_to
+from vermilion.storage.sequences import write_ply
+from vermilion.tracking.external import read_tracked
+
+
+def main(snakemake):
+    sequence = read_tracked(
+        snakemake.input.source,
+        [snakemake.params.first],
+        snakemake.params.cfg["tracking.external"]["unit_mm"],
+        subject=snakemake.wildcards.subject,
+        take=snakemake.wildcards.take,
+    )
+    write_ply(snakemake.output[0], Mesh(sequence.vertices_mm[0], sequence.triangles))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

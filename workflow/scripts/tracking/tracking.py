@@ -1,0 +1,34 @@
+"""Pose and blend weights of a whole take."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.logfile import log_to
+from vermilion.tracking.landmark_fit.expression import fit_motion
+from vermilion.tracking.landmark_fit.observation import Observations, focal_px, with_focal
+from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.validity import fits
+
+
+def main(snakemake):
+    inputs, cfg = snakemake.input, snakemake.params.cfg
+    tracker, person = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
+    track = LandmarkTrack.load(list(inputs.landmarks))
+    camera = with_focal(
+        read_cameras(inputs.cameras)[snakemake.params.camera],
+        person.focal_of(snakemake.wildcards.take),
+    )
+    seen = Observations.of(track, camera)
+    shape = LandmarkShape.of(tracker, person.identity, person.landmark_offset_mm)
+    settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+    motion = fit_motion(shape, seen, focal_px(camera), snakemake.params.fps, settings)
+    limit = cfg["tracking.motion"]["max_reprojection"]
+    valid = fits(motion, shape, focal_px(camera), limit)
+    TrackedTake.of(track.frames, motion, valid, camera, tracker).save(snakemake.output.fit)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

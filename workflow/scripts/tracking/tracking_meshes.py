@@ -1,0 +1,39 @@
+"""The coarse meshes of a chunk in the world, their quality rows, the model over the pictures."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import read_sequence, write_sequence
+from vermilion.tracking.overlay import tracking_overlay
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.validity import quality_rows
+
+
+def main(snakemake):
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    inputs, frames = snakemake.input, snakemake.params.frames
+    tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    rows = fit.index_of(frames)
+    offsets = read_sequence(inputs.offsets) if inputs.get("offsets") else None
+    vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows, offsets)
+    picture = tracking_overlay(
+        open_frames(snakemake.params.source, subject, take),
+        fit.camera,
+        tracker,
+        frames,
+        vertices,
+        LandmarkTrack.load(inputs.landmarks),
+        fit.valid[rows],
+        snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
+    )
+    write_srgb8(snakemake.output.overlay, picture)
+    write_quality(snakemake.output.quality, subject, take, "tracking", quality_rows(fit, rows))
+    write_sequence(snakemake.output.meshes, vertices)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)

@@ -1,0 +1,18 @@
+"""The topology of the coarse sequence: the person's neutral in the head frame."""
+
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.mesh import Mesh
+from vermilion.storage.logfile import log_to
+from vermilion.storage.sequences import write_ply
+from vermilion.tracking.result import Identity
+
+
+def main(snakemake):
+    tracker = FaceModel.load(snakemake.input.tracker)
+    neutral = Identity.load(snakemake.input.identity).neutral_mm
+    write_ply(snakemake.output[0], Mesh(neutral, tracker.triangles))
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
