@@ -42,11 +42,11 @@ def job(arguments, frames, ends) -> tuple[float, float]:
     folder = Path(results) / "takes" / subject / take
     model = FaceModel.load(Path(results) / "face" / "template.npz")
     neutral = read_neutral(folder / "multiview" / "neutral.npz", model.n_vertices)
-    images = ImageSettings(**ImageConfig().model_dump())
+    image_settings = ImageSettings(**ImageConfig().model_dump())
     track = TrackConfig().model_dump(exclude={"clip_frames"})
     scale = track.pop("scale")
     source = open_frames(capture, subject, take)
-    pictures = Pictures(source, read_cameras(folder / "cameras"), images)
+    pictures = Pictures(source, read_cameras(folder / "cameras"), image_settings)
     first = int(np.load(folder / "multiview" / "track.npz")["frames"][0])
     reference, load = open_coarse(pictures, first, neutral, model.triangles, scale)
     settings = TrackSettings(**{**track, "anchor_similarity": 0.0})

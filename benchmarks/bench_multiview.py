@@ -70,8 +70,8 @@ def main() -> None:
     coarse = read_track(folder / "multiview" / "track.npz", frames).astype(np.float64)
     config = MultiviewConfig()
     cameras = folder / "cameras" if (folder / "cameras").is_dir() else Path(capture) / "cameras"
-    images = ImageSettings(**config.images.model_dump())
-    pictures = Pictures(open_frames(capture, subject, take), read_cameras(cameras), images)
+    image_settings = ImageSettings(**config.images.model_dump())
+    pictures = Pictures(open_frames(capture, subject, take), read_cameras(cameras), image_settings)
     stereo = StereoSettings(**config.stereo.model_dump())
     settings = RefineSettings(**config.refine.model_dump())
     red = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]

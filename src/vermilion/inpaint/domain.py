@@ -105,9 +105,9 @@ class LipDomain:
 
     def image(self, values: np.ndarray) -> np.ndarray:
         """Values (n, ...) of the valid texels as an image (h, w, ...), zero elsewhere."""
-        picture = np.zeros((*self.shape, *values.shape[1:]), dtype=values.dtype)
-        picture[self.valid] = values
-        return picture
+        filled = np.zeros((*self.shape, *values.shape[1:]), dtype=values.dtype)
+        filled[self.valid] = values
+        return filled
 
 
 def lip_domain(model: FaceModel, skin_mm: float, inner_mm: float, texel_mm: float) -> LipDomain:

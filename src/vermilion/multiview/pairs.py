@@ -172,11 +172,11 @@ def rectified_picture(original: Camera, image: np.ndarray, turned: Camera):
     x = in_original[..., 0] / in_original[..., 2] * ko[0, 0] + ko[0, 2]
     y = in_original[..., 1] / in_original[..., 2] * ko[1, 1] + ko[1, 2]
     where = np.stack([x, y], axis=-1)
-    picture = cv2.remap(
+    rectified = cv2.remap(
         image,
         (x - 0.5).astype(np.float32),
         (y - 0.5).astype(np.float32),
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT,
     )
-    return picture, original.in_image(where, 1.0) & (in_original[..., 2] > 0)
+    return rectified, original.in_image(where, 1.0) & (in_original[..., 2] > 0)

@@ -100,10 +100,10 @@ def undistorted(camera: Camera, image: np.ndarray) -> tuple[Camera, np.ndarray]:
     straight = replace(camera, model="PINHOLE", params=tuple(float(p) for p in params))
     origins, directions = straight.rays(straight.pixel_grid())
     where = (camera.project(origins + 1000.0 * directions) - 0.5).astype(np.float32)
-    picture = cv2.remap(
+    straightened = cv2.remap(
         image, where[..., 0], where[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    return straight, picture
+    return straight, straightened
 
 
 def load_frame(

@@ -16,12 +16,12 @@ from vermilion.storage.logfile import log_to
 def main(snakemake):
     cv2.setNumThreads(1)
     cfg, params = snakemake.params.cfg, snakemake.params
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     track = TrackConfig(**cfg["multiview.track"]).model_dump(exclude={"clip_frames"})
     scale = track.pop("scale")
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
     reference, load = open_coarse(pictures, params.neutral, neutral, model.triangles, scale)
     anchor = find_anchor(reference, params.window, load, FlowMatcher(), TrackSettings(**track))

@@ -18,7 +18,7 @@ from vermilion.storage.logfile import log_to
 def main(snakemake):
     cv2.setNumThreads(1)
     cfg, params = snakemake.params.cfg, snakemake.params
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     track = TrackConfig(**cfg["multiview.track"]).model_dump(exclude={"clip_frames"})
     scale = track.pop("scale")
     model = FaceModel.load(snakemake.input.template)
@@ -32,7 +32,7 @@ def main(snakemake):
         write_clip(snakemake.output.clip, nothing)
         return
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
     reference, load = open_coarse(pictures, first, neutral, model.triangles, scale)
     start = anchors[index - 1].vertices_mm if index else neutral
     numbers, stop = list(frames), None

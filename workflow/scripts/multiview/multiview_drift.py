@@ -21,11 +21,11 @@ def main(snakemake):
     cv2.setNumThreads(1)
     cfg, frames = snakemake.params.cfg, snakemake.params.frames
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(snakemake.params.source, **place)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
     origin = Origin.of(pictures.load(snakemake.params.neutral, settings.scale), neutral, model)
     meshes, matcher, rows = read_sequence(snakemake.input.meshes), FlowMatcher(), []

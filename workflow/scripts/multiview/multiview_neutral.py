@@ -21,11 +21,11 @@ from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_ply
 
 
-def refiner_of_first_take(snakemake, images, stereo, model):
+def refiner_of_first_take(snakemake, image_settings, stereo, model):
     """What registers pictures to the neutral of the person's first take."""
     first = snakemake.params.first
     source = open_frames(first["source"], snakemake.wildcards.subject, first["take"])
-    pictures = Pictures(source, read_cameras(snakemake.input.first_cameras), images)
+    pictures = Pictures(source, read_cameras(snakemake.input.first_cameras), image_settings)
     neutral = read_neutral(snakemake.input.first_neutral, model.n_vertices)
     settings = RefineSettings(**RefineConfig(**first["cfg"]["multiview.refine"]).model_dump())
     return Refiner(pictures, model, first["frame"], neutral, stereo, settings, FlowMatcher())
@@ -34,7 +34,7 @@ def refiner_of_first_take(snakemake, images, stereo, model):
 def main(snakemake):
     cv2.setNumThreads(1)
     cfg = snakemake.params.cfg
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
     neutral = NeutralConfig(**cfg["multiview.neutral"]).model_dump(exclude={"same_points"})
     limits = {name: neutral.pop(name) for name in ("min_confidence", "landmark_distance_mm")}
@@ -42,7 +42,7 @@ def main(snakemake):
     cameras = read_cameras(snakemake.input.cameras)
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     source = open_frames(snakemake.params.source, subject, take)
-    frame = Pictures(source, cameras, images).load(snakemake.params.frame)
+    frame = Pictures(source, cameras, image_settings).load(snakemake.params.frame)
     names, points, confidence = read_views(snakemake.input.landmarks, frame.views)
     landmarks = triangulate_landmarks(
         cameras,
@@ -57,7 +57,7 @@ def main(snakemake):
     )
     print(f"{int(landmarks.valid.sum())} landmarks, {len(found.cloud)} points")
     if snakemake.params.first:
-        first = refiner_of_first_take(snakemake, images, stereo, model)
+        first = refiner_of_first_take(snakemake, image_settings, stereo, model)
         name = snakemake.params.first["take"]
         found, why = with_points_of(first, name, frame, found)
         if why:

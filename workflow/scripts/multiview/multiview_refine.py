@@ -25,12 +25,12 @@ def main(snakemake):
     cv2.setNumThreads(1)
     cfg, frames = snakemake.params.cfg, snakemake.params.frames
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
     settings = RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump())
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(snakemake.params.source, subject, take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), images)
+    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
     coarse = read_track(snakemake.input.track, frames)
     refiner = Refiner(

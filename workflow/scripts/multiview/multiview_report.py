@@ -46,9 +46,9 @@ def main(snakemake):
     report = ReportConfig(**cfg["multiview.report"])
     drift_settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
     model = FaceModel.load(inputs.template)
-    images = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
+    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
     pictures = Pictures(
-        open_frames(snakemake.params.source, **place), read_cameras(inputs.cameras), images
+        open_frames(snakemake.params.source, **place), read_cameras(inputs.cameras), image_settings
     )
     sheets = TakeSheets(
         pictures,

@@ -54,9 +54,9 @@ def main(snakemake):
                 pixel_mm = cfg["refinement.appearance"]["pixel_mm"]
                 view = start.view(index, picture, face, pixel_mm, 1)
                 offsets = at @ moved[index] if step == "layer" else 0.0
-                errors, trust, image = sample_errors(view, view.start, face, appearance, offsets)
+                errors, trust, places = sample_errors(view, view.start, face, appearance, offsets)
                 row["residual"] = photometric_residual(errors, trust)
-                results.append((f"{step} {row['residual']:.2f}", errors, trust, image))
+                results.append((f"{step} {row['residual']:.2f}", errors, trust, places))
             tables[step].append(row)
         if picture is not None and index in shown:
             sheet.append((f"{frame}", picture, results))

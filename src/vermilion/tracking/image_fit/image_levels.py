@@ -31,13 +31,13 @@ class Level:
     origin: np.ndarray
     step: np.ndarray
 
-    def sample(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def sample(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """At points (N, 2), pixels from the principal point.
 
         Returns:
             values (N, 3); derivatives (N, 3, 2) per such pixel; inside (N,) bool.
         """
-        place = (image - self.origin) / self.step - 0.5
+        place = (places - self.origin) / self.step - 0.5
         height, width = self.colours.shape[:2]
         with np.errstate(invalid="ignore"):
             inside = ((place >= 0) & (place <= [width - 1, height - 1])).all(axis=1)
@@ -68,9 +68,9 @@ def levels_of(
     """
     focal = focal_px(camera)
     depth = float(points_mm[:, 2].mean())
-    image = focal * points_mm[:, :2] / points_mm[:, 2:3]
+    places = focal * points_mm[:, :2] / points_mm[:, 2:3]
     margin = focal * _MARGIN_MM / depth
-    low, high = image.min(axis=0) - margin, image.max(axis=0) + margin
+    low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
     flat, origin, size = _ideal(picture, camera, low, high)
     wanted = max(focal * pixel_mm / depth, 1.0)
     levels = []
