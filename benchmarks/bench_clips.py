@@ -31,7 +31,7 @@ from vermilion.imaging.frames import open_frames  # noqa: E402
 from vermilion.multiview.anchors import TrackSettings, find_anchor  # noqa: E402
 from vermilion.multiview.files import read_neutral  # noqa: E402
 from vermilion.multiview.photometric import FlowMatcher  # noqa: E402
-from vermilion.multiview.take import ImageSettings, Pictures, open_coarse  # noqa: E402
+from vermilion.multiview.take import ImageSettings, MultiviewImages, open_coarse  # noqa: E402
 from vermilion.multiview.track import track_clip  # noqa: E402
 
 
@@ -46,9 +46,9 @@ def job(arguments, frames, ends) -> tuple[float, float]:
     track = TrackConfig().model_dump(exclude={"clip_frames"})
     scale = track.pop("scale")
     source = open_frames(capture, subject, take)
-    pictures = Pictures(source, read_cameras(folder / "cameras"), image_settings)
+    images = MultiviewImages(source, read_cameras(folder / "cameras"), image_settings)
     first = int(np.load(folder / "multiview" / "track.npz")["frames"][0])
-    reference, load = open_coarse(pictures, first, neutral, model.triangles, scale)
+    reference, load = open_coarse(images, first, neutral, model.triangles, scale)
     settings = TrackSettings(**{**track, "anchor_similarity": 0.0})
     start, stop = (
         None if frame is None

@@ -69,7 +69,7 @@ def true_contours(studio: FaceModel, truth_mm: np.ndarray, camera) -> list[dict[
 
 
 def kinds_of(loops: list[dict[str, np.ndarray]]) -> np.ndarray:
-    """(F,) `closed`, `rounded` or `open`, by the true contours in the picture."""
+    """(F,) `closed`, `rounded` or `open`, by the true contours in the image."""
     width = np.array([np.ptp(loop["outer"][:, 0]) for loop in loops])
     opening = np.array([np.ptp(loop["inner"][:, 1]) for loop in loops]) / np.median(width)
     opening -= opening.min()  # the corners of a closed mouth lie lower than its middle
@@ -179,12 +179,12 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
     for frame in range(0, len(true_mm), every):
         if frame in labels:
             continue
-        picture = source.read(camera.name, frame) if track.valid[frame] else None
+        image = source.read(camera.name, frame) if track.valid[frame] else None
         for name, detector in detectors.items():
             row = {"detector": name, "frame": frame, "kind": kinds[frame], "failed": True}
-            if picture is not None:
+            if image is not None:
                 start = time.process_time()
-                maps = detector.likelihood(picture, track.points_px[frame], rings[frame])
+                maps = detector.likelihood(image, track.points_px[frame], rings[frame])
                 row["maps_cpu_s"] = time.process_time() - start
                 found = find(frame, maps)
                 row |= distances(found, loops[frame], width_px)

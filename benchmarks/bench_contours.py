@@ -7,7 +7,7 @@ on the two others. Landmarks are those of the networks in the data folder. Print
 the mean distance of the found contour to the labelled one in pixels at a mouth width of 120 px,
 seconds of training, and CPU seconds a frame for both maps.
 
-- `landmarks`: ridges along the landmarks' curves, no picture;
+- `landmarks`: ridges along the landmarks' curves, no image;
 - `colour`: ridges at the border of the lips' colour near the landmarks (`kind: landmarks`);
 - `boosted`: boosted edge learning (`kind: boosted`);
 - `scikit-learn`: the same samples and features through HistGradientBoostingClassifier (soft labels
@@ -114,9 +114,9 @@ def labelled_frames(data: Path) -> dict[int, LabelledFrame]:
     landmarks = NetworkDetector(data / "landmarks66")
     source, frames = open_frames(capture), {}
     for number, path in label_paths(capture, "cam").items():
-        picture = source.read("cam", number)
+        image = source.read("cam", number)
         frames[number] = LabelledFrame(
-            picture, landmarks.detect(picture).points_px, read_label(path), number
+            image, landmarks.detect(image).points_px, read_label(path), number
         )
     return frames
 

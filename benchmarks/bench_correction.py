@@ -30,8 +30,8 @@ from scipy.spatial import cKDTree
 
 from vermilion.correction.correct import Corrector
 from vermilion.correction.domain import mesh_corners
-from vermilion.correction.image_agreement import PictureFit
-from vermilion.correction.image_contours import Picture
+from vermilion.correction.image_agreement import ImageAgreement
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.layers import decode_layers
 from vermilion.correction.right_side import LANES, TURN_SERIES, accumulate_mixture, turn_limits
 from vermilion.correspondence.correspondence import topology_hash
@@ -166,7 +166,7 @@ def main() -> None:
         model = fitted_model(kind, triangles, mask, arguments.basis_error)
         report(kind, Corrector(model, vertices, triangles, detail_mm=10.0), coarse, features)
     corrector = Corrector(model, vertices, triangles, detail_mm=10.0)
-    report_picture(corrector, vertices, coarse, features, triangles)
+    report_image(corrector, vertices, coarse, features, triangles)
     corrector = Corrector(model, vertices, triangles)  # the peer knows no displacements
     other = peer(corrector, coarse, features, triangles)
     difference = np.abs(other() - corrector.correct(coarse[:8], features[:8])).max()
@@ -222,7 +222,7 @@ def mouth_on(vertices: np.ndarray, triangles: np.ndarray) -> FaceModel:
     )
 
 
-def report_picture(
+def report_image(
     corrector: Corrector, vertices: np.ndarray, coarse: np.ndarray, features: np.ndarray, triangles
 ) -> None:
     """Print the figures of the correction with pose, contours and contact."""
@@ -241,21 +241,21 @@ def report_picture(
         for ring in lip_rings(face, 80)
     ]
     known = np.ones((N_FRAMES, 80), dtype=bool)
-    picture = Picture(face, camera, np.arange(N_FRAMES), *found, known, known)
-    fit = PictureFit.of(corrector.integrator, vertices, picture)
+    image = ImageContours(face, camera, np.arange(N_FRAMES), *found, known, known)
+    fit = ImageAgreement.of(corrector.integrator, vertices, image)
     ms = best_ms(
         {
             "whole": (
-                lambda: fit.fit(corrector.correct(coarse, features), coarse, *pose, picture),
+                lambda: fit.fit(corrector.correct(coarse, features), coarse, *pose, image),
                 N_FRAMES,
             ),
             "base": (lambda: corrector.correct(coarse, features), N_FRAMES),
         },
         rounds=4,
     )
-    print("\nwith the picture: pose, 160 contour points, contact (nothing touches)")
+    print("\nwith the image: pose, 160 contour points, contact (nothing touches)")
     print(f"features to vertices            {ms['whole']:8.2f} ms a frame (bar 15)")
-    print(f"  without the picture           {ms['base']:8.2f}")
+    print(f"  without the image           {ms['base']:8.2f}")
 
 
 def right_sides(corrector: Corrector) -> Callable:

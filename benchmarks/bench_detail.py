@@ -2,8 +2,8 @@
 
     python -m benchmarks.bench_detail
 
-Six pictures of 480 x 360 of random skin, moving evenly, the true ones off by a smooth known flow. Prints
-the mean error in pixels, CPU seconds, and their ratios to DIS, which sees only two of the pictures.
+Six images of 480 x 360 of random skin, moving evenly, the true ones off by a smooth known flow. Prints
+the mean error in pixels, CPU seconds, and their ratios to DIS, which sees only two of the images.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def main() -> None:
     frames = scenes.scene(np.array([1.2, 0.5], dtype=np.float32), truth)
     grey = [
         cv2.cvtColor(np.clip(p, 0, 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
-        for p in frames.pictures[:2]
+        for p in frames.images[:2]
     ]
     methods = {
         "six frames": lambda: corrective_flow(frames, FlowSettings()),

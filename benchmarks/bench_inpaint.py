@@ -1,4 +1,4 @@
-"""Inpainting against known un-tattooed pictures, and against OpenCV's Telea: `python -m benchmarks.bench_inpaint`.
+"""Inpainting against known un-tattooed images, and against OpenCV's Telea: `python -m benchmarks.bench_inpaint`.
 
 PSNR (dB) of display colours over the pixels that the tattoo changed, on the small mouth of
 tests/lip_patch.py, with exact meshes and with meshes that are wrong by 0.5 mm.

@@ -1,10 +1,10 @@
-"""Inpainted frames against pictures of the same frames that never had a tattoo.
+"""Inpainted frames against images of the same frames that never had a tattoo.
 
     python benchmarks/bench_inpaint_pair.py FOLDER ICT_ARCHIVE NETWORKS PERFORMANCE_CSV [FIRST_ROW]
 
 The studio renders one take of the `ict` model twice from the same curves: ten cameras with the tattoo
-(and a `plain` take), and the frontal camera truly without it. The stages run on the tattooed pictures
-with nothing but pictures to go by. NETWORKS is the folder of the landmark networks, PERFORMANCE_CSV a
+(and a `plain` take), and the frontal camera truly without it. The stages run on the tattooed images
+with nothing but images to go by. NETWORKS is the folder of the landmark networks, PERFORMANCE_CSV a
 Live Link Face recording, FIRST_ROW where the 30 frames begin in it (every third row: 10 a second).
 FOLDER keeps everything; an interrupted run goes on where it was. About six minutes of one core,
 rendering included.
@@ -13,13 +13,13 @@ Prints, and writes to FOLDER/inpaint.tsv:
 
 - PSNR (dB) of display colours over the true vermilion that the frontal camera sees, a frame and over
   all: ours with each shading; `Telea` (cv2.inpaint with the exact mask of the tattoo's pixels);
-  `cross-fade` and `clone` (the plain picture's lips moved by the similarity of the true lip landmarks
-  and blended in, or cv2.seamlessClone); `noise`, two bare pictures with different sensor noise;
+  `cross-fade` and `clone` (the plain image's lips moved by the similarity of the true lip landmarks
+  and blended in, or cv2.seamlessClone); `noise`, two bare images with different sensor noise;
 - mm between the tracker's mouth on inpainted and on truly bare frames, same identity, weighted by area,
   after a rigid alignment of each frame on the rest of the face; the same between bare frames of different
   sensor noise.
 
-Pictures for the eye: FOLDER/pictures/<frame>.png, columns tattooed, ours, truth, error (8 times), peers.
+Images for the eye: FOLDER/images/<frame>.png, columns tattooed, ours, truth, error (8 times), peers.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from vermilion.inpaint.opening import Evidence
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading
 from vermilion.storage.sequences import read_sequence
-from vermilion.studio.capture_writer import picture_path, write_pictures
+from vermilion.studio.capture_writer import image_path, write_images
 from vermilion.studio.take import StudioTakePlan, plan_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -61,7 +61,7 @@ SUBJECT_SEED = 41
 LIPS = slice(48, 66)
 VARIANTS = ("ratio", "difference", "none")
 PEERS = ("Telea", "cross-fade", "clone")
-#: Take sheets before and after the bare pictures exist; `bare2` has another sensor noise.
+#: Take sheets before and after the bare images exist; `bare2` has another sensor noise.
 SHEET = "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\n"
 CAPTURED = f"p1\tplain\tplain\tstudio\t0\t0\t{FPS}\tnone\np1\trom\ttattoo\tstudio\t0\t{{last}}\t{FPS}\tnone\n"
 BARE = "p1\t{take}\tvideo\t{source}\t0\t{last}\t{fps}\tnone\n"
@@ -133,13 +133,13 @@ def bare_plan(model: FaceModel, take: StudioTake) -> StudioTakePlan:
 def render_bare(
     folder: Path, plan: StudioTakePlan, cameras: dict[str, Camera], take: str, noise_seed: int
 ) -> None:
-    """The frontal camera's pictures without the tattoo, as a capture folder of one camera."""
+    """The frontal camera's images without the tattoo, as a capture folder of one camera."""
     studio = StudioConfig()
     frontal = {FRONTAL: cameras[FRONTAL]}
     write_cameras(folder / take / "cameras", frontal)
-    missing = [f for f in range(N_FRAMES) if not picture_path(folder / take, FRONTAL, f).exists()]
+    missing = [f for f in range(N_FRAMES) if not image_path(folder / take, FRONTAL, f).exists()]
     if missing:
-        write_pictures(
+        write_images(
             plan, frontal, folder / take, missing, 0, name="p1/rom", seed=noise_seed,
             noise_read=studio.noise_read, noise_shot=studio.noise_shot,
             n_directions=studio.occlusion_directions, n_points=studio.light_samples,
@@ -162,7 +162,7 @@ class Scene:
         self.paint = self._paint(take)
         regions = plan.model.regions
         self.red = regions["vermilion_upper"] | regions["vermilion_lower"]
-        self.plain = read_image(picture_path(self.results / "captures/p1/plain", FRONTAL, 0))
+        self.plain = read_image(image_path(self.results / "captures/p1/plain", FRONTAL, 0))
 
     def _paint(self, take: Path) -> Paint:
         config = InpaintConfig()
@@ -185,7 +185,7 @@ class Scene:
         return hits.hit & self.red[triangles].all(axis=1)[hits.triangle]
 
     def ours(self, frame: int, inked: np.ndarray, mode: str) -> np.ndarray:
-        """The stage's own picture, or the same painted here with another shading."""
+        """The stage's own image, or the same painted here with another shading."""
         if mode == self.paint.shading.mode:
             return to_display(read_image(self.inpainted / f"{frame:06d}.png"))
         paint = replace(self.paint, shading=replace(self.paint.shading, mode=mode))
@@ -196,7 +196,7 @@ class Scene:
         )
 
     def lips_px(self, frame: int) -> np.ndarray:
-        """The true lip landmarks in the frontal picture."""
+        """The true lip landmarks in the frontal image."""
         return self.camera.project(self.plan.vertices_mm(frame)[self.plan.model.landmarks[LIPS]])
 
 
@@ -235,14 +235,14 @@ def decibels(mean_square: float) -> float:
     return float(-10 * np.log10(max(mean_square, 1e-12)))
 
 
-def measure_pictures(scene: Scene) -> pd.DataFrame:
+def measure_images(scene: Scene) -> pd.DataFrame:
     """PSNR in dB: a row a frame and a last one over all frames' pixels together."""
     rows, sums = [], {}
     for frame in range(N_FRAMES):
-        linear = read_image(picture_path(scene.capture, FRONTAL, frame))
+        linear = read_image(image_path(scene.capture, FRONTAL, frame))
         inked = to_display(linear)
         bare, again = (
-            to_display(read_image(picture_path(scene.folder / take, FRONTAL, frame)))
+            to_display(read_image(image_path(scene.folder / take, FRONTAL, frame)))
             for take in ("bare", "bare2")
         )
         where, mask = scene.vermilion(frame), tattooed_pixels(inked, bare)
@@ -263,7 +263,7 @@ def measure_pictures(scene: Scene) -> pd.DataFrame:
 
 
 def write_sheet_of(scene, frame, inked, bare, candidates, where) -> None:
-    """The lips' pictures side by side, four times enlarged."""
+    """The lips' images side by side, four times enlarged."""
     rows, columns = np.nonzero(cv2.dilate(where.astype(np.uint8), np.ones((25, 25))))
     crop = (slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1))
     default = candidates[scene.paint.shading.mode]
@@ -276,7 +276,7 @@ def write_sheet_of(scene, frame, inked, bare, candidates, where) -> None:
     ]
     big += [np.zeros_like(big[0])] * (-len(big) % 4)
     lines = [np.hstack(big[i : i + 4]) for i in range(0, len(big), 4)]
-    path = scene.folder / "pictures" / f"{frame:03d}.png"
+    path = scene.folder / "images" / f"{frame:03d}.png"
     path.parent.mkdir(exist_ok=True)
     cv2.imwrite(str(path), np.vstack(lines)[..., ::-1])
 
@@ -321,7 +321,7 @@ def main() -> None:
     targets = [f"results/takes/p1/{t}/tracking/C/{chunk}.npy" for t in ("rom", "bare", "bare2")]
     run_workflow(folder, [*targets, "results/subjects/p1/correspondence.npz"])
     scene = Scene(folder, plan)
-    table = measure_pictures(scene)
+    table = measure_images(scene)
     table.to_csv(folder / "inpaint.tsv", sep="\t", index=False, float_format="%.2f")
     print(table.to_string(index=False, float_format="%.1f"))
     measure_tracks(scene)

@@ -17,9 +17,9 @@ are two truths:
   correction; raw is raw.
 
 Prints pixels raw > corrected and the share of the error that went, then CPU milliseconds a frame. Landmarks
-alone, of any pictures (a folder of frames, a video) on one thread, are timed by
+alone, of any images (a folder of frames, a video) on one thread, are timed by
 
-    python -m benchmarks.bench_landmarks PICTURES models=FOLDER
+    python -m benchmarks.bench_landmarks IMAGES models=FOLDER
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ def material_points(
     corners, shares, known = skin[hits.triangle].copy(), hits.barycentric.copy(), hits.hit.copy()
     used = np.unique(skin)
     used = used[caster.visible(camera, frames_mm[0])[used]]
-    pictured = camera.project(frames_mm[0][used])
+    imaged = camera.project(frames_mm[0][used])
     for point in np.flatnonzero(~known):
-        distance = np.linalg.norm(pictured - points_px[point], axis=1)
+        distance = np.linalg.norm(imaged - points_px[point], axis=1)
         if distance.min() < 0.06 * interocular_px(points_px):
             corners[point], shares[point] = used[distance.argmin()], [1.0, 0.0, 0.0]
             known[point] = True
@@ -175,8 +175,8 @@ def main(results: str, name: str, places: dict[str, str], changes: dict[str, flo
         print(f"  {len(keys.frames)} key frames; CPU ms a frame: key frames "
               f"{1e3 * (chosen - start) / n:.0f}, correction {1e3 * (done - chosen) / n:.0f}")  # fmt: skip
     if "models" in places:
-        pictures = [source.read(camera.name, int(frame)) for frame in detected.frames[:20]]
-        time_networks(places["models"], pictures)
+        images = [source.read(camera.name, int(frame)) for frame in detected.frames[:20]]
+        time_networks(places["models"], images)
     if (folder / "tracking" / "fit.npz").is_file():
         time_fit(root, subject, folder, detected)
 
@@ -196,22 +196,22 @@ class TimedSession:
             self.seconds += time.process_time() - start
 
 
-def time_networks(models: str, pictures: list[np.ndarray], rounds: int = 5) -> None:
+def time_networks(models: str, images: list[np.ndarray], rounds: int = 5) -> None:
     """The least and the median of some rounds: other load only ever adds."""
     detector = NetworkDetector(models)
-    detector.detect(pictures[0])
+    detector.detect(images[0])
     whole, inside = [], []
     for _ in range(rounds):
         sessions = [TimedSession(detector._face), TimedSession(detector._landmarks)]
         detector._face, detector._landmarks = sessions
         start = time.process_time()
-        for picture in pictures:
-            detector.detect(picture)
-        whole.append(1e3 * (time.process_time() - start) / len(pictures))
-        inside.append(1e3 * sum(s.seconds for s in sessions) / len(pictures))
+        for image in images:
+            detector.detect(image)
+        whole.append(1e3 * (time.process_time() - start) / len(images))
+        inside.append(1e3 * sum(s.seconds for s in sessions) / len(images))
         detector._face, detector._landmarks = (s.session for s in sessions)
     best = int(np.argmin(whole))
-    height, width = pictures[0].shape[:2]
+    height, width = images[0].shape[:2]
     print(
         f"  landmarks, {width} x {height}: {whole[best]:.1f} CPU ms a frame (median of {rounds} rounds "
         f"{np.median(whole):.1f}): networks {inside[best]:.1f}, the rest {whole[best] - inside[best]:.1f}"

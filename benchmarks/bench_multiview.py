@@ -33,7 +33,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.multiview.files import read_neutral, read_track
 from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 
 
 class Truth:
@@ -71,14 +71,16 @@ def main() -> None:
     config = MultiviewConfig()
     cameras = folder / "cameras" if (folder / "cameras").is_dir() else Path(capture) / "cameras"
     image_settings = ImageSettings(**config.images.model_dump())
-    pictures = Pictures(open_frames(capture, subject, take), read_cameras(cameras), image_settings)
+    images = MultiviewImages(
+        open_frames(capture, subject, take), read_cameras(cameras), image_settings
+    )
     stereo = StereoSettings(**config.stereo.model_dump())
     settings = RefineSettings(**config.refine.model_dump())
     red = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
     errors, seconds = {}, {}
 
     def refined(name, options):
-        refiner = Refiner(pictures, model, 0, neutral, stereo, options, FlowMatcher())
+        refiner = Refiner(images, model, 0, neutral, stereo, options, FlowMatcher())
         refiner.refine(frames[0], coarse[0])  # what is computed once a take
         start = time.process_time()
         found = [refiner.refine(f, c) for f, c in zip(frames, coarse, strict=True)]

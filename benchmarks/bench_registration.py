@@ -36,7 +36,7 @@ from vermilion.multiview.files import read_neutral, read_views
 from vermilion.multiview.neutral import StereoSettings, stereo_cloud
 from vermilion.multiview.nonrigid import register_to_cloud
 from vermilion.multiview.solver import ThinPlate
-from vermilion.multiview.take import ImageSettings, Pictures
+from vermilion.multiview.take import ImageSettings, MultiviewImages
 from vermilion.multiview.template_fit import deform_to_landmarks, fit_template
 from vermilion.multiview.triangulate import triangulate_landmarks
 
@@ -50,7 +50,7 @@ def main() -> None:
     settings, stereo = config.neutral, StereoSettings(**config.stereo.model_dump())
     cameras = read_cameras(folder / "cameras")
     images = ImageSettings(**ImageConfig().model_dump())
-    frame = Pictures(open_frames(capture, subject, take), cameras, images).load(0)
+    frame = MultiviewImages(open_frames(capture, subject, take), cameras, images).load(0)
     names, points, confidence = read_views(folder / "landmarks/views_neutral.npz", frame.views)
     landmarks = triangulate_landmarks(
         cameras, names, points, confidence, min_confidence=settings.min_confidence,

@@ -9,7 +9,7 @@ compared with the nearest visible vertex of the truth. Mono13 reports 1.71 mm. `
 distance to the true surface. Depth jitter is the mean second difference over time of the face's mean
 depth less the truth's. Residuals are those of `tracking/residuals/` (display values, 0 to 255).
 
-Speed, where a picture source is given (`--source`): seconds a frame of this core's time (what else
+Speed, where an image source is given (`--source`): seconds a frame of this core's time (what else
 runs does not count) of the photometric step and of the corrective layer, and their ratio to the
 landmark fit of the same frames.
 """
@@ -144,8 +144,8 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     spent = np.zeros(3)
     for row in rows:
         marks = [time.process_time()]
-        picture = frames.read(fit.camera.name, int(fit.frames[row]))
-        view = start.view(row, picture, face, options["appearance"]["pixel_mm"], levels)
+        image = frames.read(fit.camera.name, int(fit.frames[row]))
+        view = start.view(row, image, face, options["appearance"]["pixel_mm"], levels)
         marks.append(time.process_time())
         problem.solve(view)
         marks.append(time.process_time())
@@ -154,7 +154,7 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
         spent += np.diff(marks)
     reading, solving, bending_s = spent / len(rows)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(f"landmark fit {1e3 * base:.1f} ms a frame; the steps, reading the picture included:")
+    print(f"landmark fit {1e3 * base:.1f} ms a frame; the steps, reading the image included:")
     for name, cost in (("photometric", reading + solving), ("layer", reading + bending_s)):
         print(f"  {name:12} {cost:.3f} s a frame, {cost / base:.0f} x the landmark fit")
     print(f"peak memory {peak:.2f} GB (bars: 0.3 s, 2 GB)")
@@ -167,7 +167,7 @@ def main() -> None:
     parser.add_argument("--take", default="p1/phone", help="subject/take")
     parser.add_argument("--truth", type=Path, help="folder of the truth (evaluation.truth)")
     parser.add_argument("--face-vertices", type=int, default=9409, help="of the truth: the face")
-    parser.add_argument("--source", help="pictures of the take, to measure speed")
+    parser.add_argument("--source", help="images of the take, to measure speed")
     parser.add_argument("--fps", type=float, default=30.0)
     parser.add_argument("--count", type=int, default=12, help="frames that speed is measured on")
     args = parser.parse_args()

@@ -1,4 +1,4 @@
-"""A small mouth with known pictures, with and without tattoo, for the tests of inpainting.
+"""A small mouth with known images, with and without tattoo, for the tests of inpainting.
 
 A ring mesh: the inner loop is the mouth opening, the first rows turn inwards (mouth_inner), then
 come the lips (vermilion), then skin. Its chart is polar, so that nothing overlaps.
@@ -101,18 +101,18 @@ def albedo(tattoo: bool, seed: int = 5) -> np.ndarray:
     fine = cv2.GaussianBlur(rng.normal(size=u.shape), (0, 0), 3)
     fine *= 0.03 / fine.std()
     lips = np.clip((LIP_ROWS + 0.5 - row) / 1.5, 0, 1)[..., None]
-    picture = (1 - lips) * [0.66, 0.55, 0.46] + lips * [0.80, 0.50, 0.50] + fine[..., None]
+    image = (1 - lips) * [0.66, 0.55, 0.46] + lips * [0.80, 0.50, 0.50] + fine[..., None]
     if tattoo:
         pattern = cv2.GaussianBlur(rng.normal(size=u.shape), (0, 0), 5) > 0
         ink = np.where(pattern[..., None], [0.9, 0.9, 0.85], [0.25, 0.3, 0.45])
-        picture = np.where((row < LIP_ROWS + 1.2)[..., None], ink, picture)
-    return srgb_to_linear(np.clip(picture, 0, 1))
+        image = np.where((row < LIP_ROWS + 1.2)[..., None], ink, image)
+    return srgb_to_linear(np.clip(image, 0, 1))
 
 
 def render(
     model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float = 1.0
 ) -> np.ndarray:
-    """Linear picture (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
+    """Linear image (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
     over = 4
     size = (camera.width_px, camera.height_px)
     x, y = np.meshgrid(*(np.arange(n * over) + 0.5 for n in size))
@@ -133,6 +133,6 @@ def render(
 
 
 def psnr_db(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> float:
-    """Signal to noise of display colours of two linear pictures (dB)."""
+    """Signal to noise of display colours of two linear images (dB)."""
     error = (to_display(a)[where].astype(float) - to_display(b)[where].astype(float)) / 255
     return float(-10 * np.log10((error**2).mean()))

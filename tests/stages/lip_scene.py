@@ -1,6 +1,6 @@
 """Two procedural people who speak with rolled lips, and the coarse track of a model that cannot.
 
-Everything that comes before the correspondence is written as files, without pictures: H is the
+Everything that comes before the correspondence is written as files, without images: H is the
 truth, C is the tracker's model fitted to noisy landmarks, features are the model's weights and the
 width and height of the lips.
 """

@@ -18,11 +18,11 @@ POSES = [(0.0, 0.0), (0.7, 0.02), (1.5, 0.05), (2.2, 0.1)]
 LOST = {(2, "left")}  # a frame that a camera misses
 PLACE = {"subject": "s1", "take": "rom"}
 
-#: Sizes for pictures of 240 x 180; the sheet is small, so that little of it is hidden.
+#: Sizes for images of 240 x 180; the sheet is small, so that little of it is hidden.
 SETTINGS = MultiviewConfig(
     stereo={"reach_mm": 30, "speckle_px": 50},
     neutral={"first_gate_mm": 6, "last_gate_mm": 2, "rounds": 5, "poisson_depth": 6},
-    # the small mouth fills the pictures, so that frames look less alike
+    # the small mouth fills the images, so that frames look less alike
     track={"scale": 1.0, "anchor_similarity": 0.2},
     refine={"scales": [1.0, 1.0], "cloud_scale": 1.0},
 )
@@ -30,9 +30,9 @@ CFG = {f"multiview.{key}": value for key, value in SETTINGS.model_dump(mode="jso
 
 
 def make_capture(root, rig, lost=(), save=None, placed=lambda vertices: vertices, marks_mm=0):
-    """Pictures, cameras, landmarks and a template that is of another face, of four frames.
+    """Images, cameras, landmarks and a template that is of another face, of four frames.
 
-    `save(picture, camera, folder, stem)` writes a picture; PNG by default. `placed(vertices)` is
+    `save(image, camera, folder, stem)` writes an image; PNG by default. `placed(vertices)` is
     where the head is; landmarks are marked `marks_mm` beside their places.
     """
     person = lip_patch.face_model()
@@ -42,12 +42,12 @@ def make_capture(root, rig, lost=(), save=None, placed=lambda vertices: vertices
         for name, camera in rig.items():
             if (frame, name) in lost:
                 continue
-            picture = lip_patch.render(person, vertices, camera, tattoo=True)
+            image = lip_patch.render(person, vertices, camera, tattoo=True)
             folder, stem = root / f"rom/frames/{name}", f"{frame:06d}"
             if save is None:
-                write_image(folder / f"{stem}.png", picture)
+                write_image(folder / f"{stem}.png", image)
             else:
-                save(picture, name, folder, stem)
+                save(image, name, folder, stem)
     rows = np.repeat([lip_patch.LIP_ROWS, 19, 26], 22)
     columns = np.tile(np.linspace(0, lip_patch.COLUMNS, 22, endpoint=False).astype(int), 3)
     landmarks = (rows * lip_patch.COLUMNS + columns).astype(np.int32)

@@ -53,7 +53,7 @@ def check(source, out, frames=FRAMES):
 def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
     source, out = tmp_path / "capture", tmp_path / "out"
     truth = write_capture(source)
-    (source / "frames/mid/000001.png").write_bytes(b"not a picture")
+    (source / "frames/mid/000001.png").write_bytes(b"not an image")
     manifests = [check(source, out, [0, 1]), check(source, out, [2])]
     rows = read_table(out / "capture/quality/000000-000001.tsv")
     assert list(rows["valid"]) == [1, 0] and "mid: unreadable" in rows["reason"][1]

@@ -68,10 +68,10 @@ def take(tmp_path_factory):
     capture = root / "capture"
     points = []
     for frame, (opening, height) in enumerate(SHAPES):
-        picture, landmarks, label = draw_mouth(opening, height, seed=frame)
+        image, landmarks, label = draw_mouth(opening, height, seed=frame)
         points.append(landmarks)
         path = capture / f"frames/cam/{frame:06d}.png"
-        write_image(path, picture)
+        write_image(path, image)
         if frame == UNREADABLE:
             path.write_bytes(path.read_bytes()[:500])
         if frame in LABELLED:
@@ -191,7 +191,7 @@ def test_a_frame_that_cannot_be_read_is_flagged_and_the_others_go_on(take):
     assert np.isfinite(features.features).all()
 
 
-def test_maps_have_the_pictures_size_and_lie_in_range(take):
+def test_maps_have_the_images_size_and_lie_in_range(take):
     root, _ = take
     inner, outer = read_maps(root / "000000-000004/maps/000003.exr")
     assert inner.shape == outer.shape == (240, 240)
@@ -272,8 +272,8 @@ def test_labels_beside_the_border_are_moved_and_flagged_and_a_damaged_frame_left
         drawn["outer"]["points"] = (middle + 0.9 * (points - middle)).tolist()
         path.write_text(json.dumps(drawn))
     (labels / "000900.json").write_text("of another take, and no label at all")
-    picture = capture / "frames/cam/000002.png"
-    picture.write_bytes(picture.read_bytes()[:500])
+    image = capture / "frames/cam/000002.png"
+    image.write_bytes(image.read_bytes()[:500])
     train(root, {**params, "capture": str(capture), "source": str(capture)}, tmp_path)
     said = read_table(tmp_path / "labels.tsv")
     assert said["frame"].tolist() == [0, 1, 2]
@@ -290,6 +290,6 @@ def test_a_take_whose_frames_are_all_damaged_falls_back_on_landmarks(take, tmp_p
     for frame in FRAMES:
         path = tmp_path / f"frames/cam/{frame:06d}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(b"no picture")
+        path.write_bytes(b"no image")
     train(root, {**params, "capture": str(tmp_path), "source": str(tmp_path)}, tmp_path)
     assert isinstance(load_detector(tmp_path / "detector.npz"), LandmarkRidgeDetector)

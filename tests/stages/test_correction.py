@@ -57,7 +57,7 @@ def run_correspondence(root, subject):
             "coarse": take / f"tracking/C/{CHUNKS[0]}.npy",
             "fit": take / "tracking/fit.npz",
             "landmarks": take / f"landmarks/{CHUNKS[0]}.npz",
-            "picture": take / f"inpaint/{CHUNKS[0]}",
+            "image": take / f"inpaint/{CHUNKS[0]}",
         },
         output={
             "correspondence": root / f"subjects/{subject}/correspondence.npz",
@@ -156,7 +156,7 @@ def run_train(root, regressor):
         output={
             "model": root / f"models/{regressor}.h5",
             "curve": root / f"models/{regressor}.cv.tsv",
-            "picture": root / f"models/{regressor}.cv.png",
+            "image": root / f"models/{regressor}.cv.png",
         },
     )
 

@@ -1,4 +1,4 @@
-"""The finer sequence from pictures and coarse meshes: better, and the same for any chunks."""
+"""The finer sequence from images and coarse meshes: better, and the same for any chunks."""
 
 import cv2
 import numpy as np
@@ -71,8 +71,8 @@ def render(vertices):
     return np.where(hits.hit[..., None], colours, 0.1)
 
 
-def write_take(root, sizes, coarse, picture_of, missing=()):
-    """Tracker, fit, pictures (`picture_of` a frame) and coarse meshes (F, V, 3) in chunks of `sizes`."""
+def write_take(root, sizes, coarse, image_of, missing=()):
+    """Tracker, fit, images (`image_of` a frame) and coarse meshes (F, V, 3) in chunks of `sizes`."""
     n_frames = len(coarse)
     MODEL.save(root / "tracker.npz")
     motion = HeadMotion(
@@ -85,7 +85,7 @@ def write_take(root, sizes, coarse, picture_of, missing=()):
     TrackedTake.of(np.arange(n_frames), motion, valid, CAMERA, MODEL).save(root / "fit.npz")
     for frame in range(n_frames):
         if frame not in missing:
-            write_image(root / "frames" / "cam" / f"{frame:06d}.png", picture_of(frame))
+            write_image(root / "frames" / "cam" / f"{frame:06d}.png", image_of(frame))
     paths = []
     for first, size in zip(np.cumsum([0, *sizes]), sizes, strict=False):
         paths.append(root / "C" / f"{first:06d}-{first + size - 1:06d}.npy")
@@ -139,7 +139,7 @@ def test_meshes_come_nearer_the_truth_whatever_the_chunks(tmp_path):
     assert read_image(tmp_path / "one" / f"overlay{name}.png").std() > 0
 
 
-def test_missing_picture_leaves_the_coarse_mesh_and_says_so(tmp_path):
+def test_missing_image_leaves_the_coarse_mesh_and_says_so(tmp_path):
     _, coarse, paths = prepare(tmp_path, [N_FRAMES], missing=(2,))
     found = run_stage(tmp_path, paths)
     assert np.abs(found[2] - coarse[2]).max() < 1e-4

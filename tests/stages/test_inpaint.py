@@ -40,8 +40,8 @@ def capture(tmp_path_factory):
     for frame, pose in enumerate(POSES):
         for name, camera in rig.items():
             if frame == 0 or name == "front":
-                picture = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=True)
-                write_image(root / f"rom/frames/{name}/{frame:06d}.png", picture)
+                image = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=True)
+                write_image(root / f"rom/frames/{name}/{frame:06d}.png", image)
     run_script(
         "inpaint/plain_texture",
         wildcards={"subject": "s1"},

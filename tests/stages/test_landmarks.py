@@ -31,14 +31,14 @@ def stage(tmp_path_factory):
     labels = root / "people" / "labels" / "landmarks" / "cam"
     labels.mkdir(parents=True)
     for frame in range(N_LABELLED):
-        picture, points = drawn_face(rng)
-        write_image(root / "people" / "frames" / "cam" / f"{frame:06d}.png", picture)
+        image, points = drawn_face(rng)
+        write_image(root / "people" / "frames" / "cam" / f"{frame:06d}.png", image)
         text = json.dumps({"unit": "px", "points": points.tolist()})
         (labels / f"{frame:06d}.json").write_text(text)
     truth = []
     for frame in range(N_FRAMES):
-        picture, points = drawn_face(rng)
-        write_image(root / "take" / "frames" / "cam" / f"{frame:06d}.png", picture)
+        image, points = drawn_face(rng)
+        write_image(root / "take" / "frames" / "cam" / f"{frame:06d}.png", image)
         truth.append(points)
     write_image(root / "take" / "frames" / "empty" / "000000.png", np.full((60, 80, 3), 0.3))
     damaged = root / "take" / "frames" / "cam" / "000002.png"
@@ -79,7 +79,7 @@ def find(root, frames, params, **inputs):
     return LandmarkTrack.load(root / "out.npz"), read_table(root / "out.tsv")
 
 
-def test_landmarks_are_found_and_a_damaged_picture_is_flagged(stage):
+def test_landmarks_are_found_and_a_damaged_image_is_flagged(stage):
     root, truth = stage
     track, quality = find(root, list(range(N_FRAMES)), parameters(root))
     good = [0, 1, 3]
@@ -133,10 +133,10 @@ def moving(stage, tmp_path_factory):
     """A take whose face moves by two pixels a frame, frame 2 damaged, detected landmarks noisy."""
     root = tmp_path_factory.mktemp("moving")
     rng = np.random.default_rng(9)
-    picture, points = drawn_face(rng)
+    image, points = drawn_face(rng)
     for frame in range(N_FRAMES):
         path = root / "take" / "frames" / "cam" / f"{frame:06d}.png"
-        write_image(path, np.roll(picture, 2 * frame, axis=1))
+        write_image(path, np.roll(image, 2 * frame, axis=1))
     damaged = root / "take" / "frames" / "cam" / "000002.png"
     damaged.write_bytes(damaged.read_bytes()[:400])
     truth = points + 2.0 * np.arange(N_FRAMES)[:, None, None] * [1, 0]
@@ -151,7 +151,7 @@ def moving(stage, tmp_path_factory):
 
 
 def correction_settings():
-    """What the default says of correction, for small pictures."""
+    """What the default says of correction, for small images."""
     return {"landmarks.correction": section()["correction"] | {"face_px": 100.0}}
 
 

@@ -143,7 +143,7 @@ def test_an_unreadable_frame_is_flagged_and_the_rest_go_on(take):
     refine(take, [1, 2], "000001-000002", source="torn")
     table = read_table(take / "quality/000001-000002.tsv")
     assert table["valid"].tolist() == [0, 1]
-    assert "0 readable pictures" in table["reason"][0]
+    assert "0 readable images" in table["reason"][0]
     assert np.isfinite(read_sequence(take / "H/000001-000002.npy")).all()
 
 

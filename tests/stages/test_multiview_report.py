@@ -17,7 +17,7 @@ from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
 
-#: One camera misses a frame; of another frame a single picture is left.
+#: One camera misses a frame; of another frame a single image is left.
 LOST = {(1, "left"), (3, "front"), (3, "left")}
 FULL_SIZE = {**CFG, "multiview.drift": {**CFG["multiview.drift"], "scale": 1.0}}
 WHOLE = "000000-000003"
@@ -70,8 +70,8 @@ def report(root, name, tracked):
     )
 
 
-def pictures_in(page):
-    """Decoded pictures (h, w, 3) of a page."""
+def images_in(page):
+    """Decoded images (h, w, 3) of a page."""
     files = re.findall(r'src="data:image/(?:png|jpeg);base64,([^"]+)"', page)
     return [cv2.imdecode(np.frombuffer(base64.b64decode(f), np.uint8), 1) for f in files]
 
@@ -82,7 +82,7 @@ def test_drift_is_small_and_says_what_is_missing(take):
         assert table.loc[(frame, "all"), "drift_mm_vermilion"] < 0.1
     assert "left" in table.loc[(1, "left"), "reason"]
     assert np.isnan(table.loc[(3, "all"), "drift_mm_skin"])
-    assert "1 readable pictures" in table.loc[(3, "all"), "reason"]
+    assert "1 readable images" in table.loc[(3, "all"), "reason"]
 
 
 def test_chunk_size_changes_no_drift(take):
@@ -92,11 +92,11 @@ def test_chunk_size_changes_no_drift(take):
     pd.testing.assert_frame_equal(same, part)
 
 
-def test_the_page_names_the_flagged_frame_and_the_missing_picture(take):
+def test_the_page_names_the_flagged_frame_and_the_missing_image(take):
     page = (take / "rom.html").read_text()
     flagged = page.split("Flagged frames</h2>")[1].split("<h2")[0]
-    assert "1 readable pictures" in flagged and ">3<" in flagged
-    missing = page.split("Missing pictures</h2>")[1].split("<h2")[0]
+    assert "1 readable images" in flagged and ">3<" in flagged
+    missing = page.split("Missing images</h2>")[1].split("<h2")[0]
     assert ">left<" in missing and ">1<" in missing
 
 
@@ -107,14 +107,14 @@ def test_the_page_has_everything_in_it(take):
     assert "http" not in page and "<script" not in page and "url(" not in page
     shown = [int(n) for n in re.findall(r"<h3>Frame (\d+)</h3>", page)]
     assert 0 in shown and 3 not in shown and len(shown) >= 2
-    pictures = pictures_in(page)
-    assert len(pictures) == 1 + len(shown)  # curves, then a sheet a frame
-    assert all(picture.shape[1] == 7 * 200 for picture in pictures[1:])
+    images = images_in(page)
+    assert len(images) == 1 + len(shown)  # curves, then a sheet a frame
+    assert all(image.shape[1] == 7 * 200 for image in images[1:])
 
 
 def test_a_take_of_a_neutral_alone_has_a_page(take):
     report(take, "plain", tracked=False)
     page = (take / "plain.html").read_text()
-    assert len(pictures_in(page)) == 1
+    assert len(images_in(page)) == 1
     assert "neighbouring cameras" in page
     assert len(read_table(take / "plain.tsv", ["frame", "camera"])) == 0

@@ -21,7 +21,7 @@ EXPOSURES = {"front": 0.5, "left": 1.0, "right": 1.4}
 
 
 def mixed_rig():
-    """The three cameras with lenses of three COLMAP models and three picture sizes."""
+    """The three cameras with lenses of three COLMAP models and three image sizes."""
     rig = lip_patch.cameras()
     front = rig["front"].resized(1.25)
     f, _, cx, cy = rig["left"].params
@@ -43,15 +43,15 @@ def wide_rig():
     }
 
 
-def save_mixed(picture, name, folder, stem):
+def save_mixed(image, name, folder, stem):
     """16-bit PNG, linear EXR and JPEG, each at another exposure."""
-    picture = np.clip(picture * EXPOSURES[name], 0, 1)
+    image = np.clip(image * EXPOSURES[name], 0, 1)
     if name == "front":
         folder.mkdir(parents=True, exist_ok=True)
-        pixels = np.rint(linear_to_srgb(picture) * 65535).astype(np.uint16)
+        pixels = np.rint(linear_to_srgb(image) * 65535).astype(np.uint16)
         assert cv2.imwrite(str(folder / f"{stem}.png"), pixels[..., ::-1])
     else:
-        write_image(folder / f"{stem}{'.exr' if name == 'left' else '.jpg'}", picture)
+        write_image(folder / f"{stem}{'.exr' if name == 'left' else '.jpg'}", image)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stages.run_script import run_script
-from tests.unit.photometric_scene import CAMERA, dome, mesh_of, motion, picture_of, take_parts
+from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion, take_parts
 from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.imaging.images import read_image, write_image
@@ -36,7 +36,7 @@ def run_stage(root, sizes):
     fit.save(root / "landmark_fit.npz")
     for frame, row in enumerate(truth):
         path = root / "frames" / "cam" / f"{frame:06d}.exr"
-        write_image(path, picture_of(MODEL, mesh_of(MODEL, row)))
+        write_image(path, image_of(MODEL, mesh_of(MODEL, row)))
     landmarks, chunks, first = [], [], 0
     for size in sizes:
         frames = list(range(first, first + size))
@@ -111,7 +111,7 @@ def results(tmp_path_factory):
     return root, *run_stage(root, [N_FRAMES])
 
 
-def test_each_step_explains_more_of_the_pictures(results):
+def test_each_step_explains_more_of_the_images(results):
     root, fit, _ = results
     means = [
         read_table(root / "residuals" / step / "000000-000005.tsv")["residual"].mean()

@@ -1,4 +1,4 @@
-"""Relief from pictures and smooth meshes: found, averaged, and the same for any chunks."""
+"""Relief from images and smooth meshes: found, averaged, and the same for any chunks."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ def test_wrinkle_is_found_whatever_the_chunks(tmp_path):
     assert np.abs(maps[0]["R"] - 0.5).max() < 0.3 * np.abs(maps[1]["R"] - 0.5).max()
 
 
-def test_frame_without_picture_is_flagged(tmp_path):
+def test_frame_without_image_is_flagged(tmp_path):
     paths = prepare(tmp_path, [N_FRAMES], missing=(3,))
     found = run_stage(tmp_path, paths)
     assert np.isfinite(found).all()

@@ -1,4 +1,4 @@
-"""The studio on a tiny take: known facts of its pictures, labels and truth."""
+"""The studio on a tiny take: known facts of its images, labels and truth."""
 
 import json
 
@@ -13,10 +13,10 @@ from vermilion.imaging.images import read_image
 from vermilion.storage.files import sha256_of
 from vermilion.storage.sequences import read_sequence
 from vermilion.studio.capture_writer import (
+    image_path,
     label_path,
-    picture_path,
+    write_images,
     write_labels,
-    write_pictures,
     write_truth,
 )
 from vermilion.studio.labels import contours, label_frames, view_mouth
@@ -84,7 +84,7 @@ def cameras(rom):
     return cameras_of(rom, "tattoo", **SIZES)
 
 
-def pictures(take, surface, cameras, index=0):
+def images(take, surface, cameras, index=0):
     return render(take.stage(index, surface, **RAYS), take.vertices_mm(index), cameras)
 
 
@@ -102,11 +102,11 @@ def test_the_first_frame_is_the_neutral_with_the_mouth_slightly_open(model, rom)
     assert np.abs(rom.vertices_mm(0) - rom.neutral_mm() - 0.08 * opening).max() < 1e-6  # mm
 
 
-def test_no_picture_depends_on_the_other_cameras_or_their_order(rom, surface, cameras):
+def test_no_image_depends_on_the_other_cameras_or_their_order(rom, surface, cameras):
     pair = {name: cameras[name] for name in ("face2", "lip0")}
-    both = pictures(rom, surface, pair)
-    turned = pictures(rom, surface, dict(reversed(pair.items())))
-    alone = pictures(rom, surface, {"lip0": cameras["lip0"]})
+    both = images(rom, surface, pair)
+    turned = images(rom, surface, dict(reversed(pair.items())))
+    alone = images(rom, surface, {"lip0": cameras["lip0"]})
     for name in pair:
         assert np.array_equal(both[name], turned[name])
     assert np.array_equal(both["lip0"], alone["lip0"])
@@ -116,7 +116,7 @@ def test_the_tattoo_changes_vermilion_pixels_alone(model, surface, rom, cameras)
     bare = plan(model, role="plain")
     for name in ("face2", "lip0", "lip2"):
         one = {name: cameras[name]}
-        painted, skin = (pictures(take, surface, one)[name] for take in (rom, bare))
+        painted, skin = (images(take, surface, one)[name] for take in (rom, bare))
         changed = np.abs(painted - skin).max(axis=2) > 1e-3
         hits = RayCaster(rom.vertices_mm(0), model.triangles).see(cameras[name])
         red = surface.lip_mm[model.triangles[np.maximum(hits.triangle, 0)]].max(axis=-1) > 0
@@ -126,10 +126,10 @@ def test_the_tattoo_changes_vermilion_pixels_alone(model, surface, rom, cameras)
 
 
 def test_paint_ends_where_the_labelled_contour_runs(model, surface, rom, cameras):
-    """The picture and the label agree: within a pixel in the mean, with a label of its own path."""
+    """The image and the label agree: within a pixel in the mean, with a label of its own path."""
     camera = cameras["lip2"]
     bare = plan(model, role="plain")
-    painted, skin = (pictures(take, surface, {"x": camera})["x"] for take in (rom, bare))
+    painted, skin = (images(take, surface, {"x": camera})["x"] for take in (rom, bare))
     changed = (np.abs(painted - skin).max(axis=2) > 0.02).astype(np.uint8)
     loops, _ = cv2.findContours(changed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     edge = np.concatenate([loop[:, 0] for loop in loops]) + 0.5
@@ -142,7 +142,7 @@ def test_paint_ends_where_the_labelled_contour_runs(model, surface, rom, cameras
     assert depth.min() > -1.0  # px: nothing painted outside
 
 
-def test_projected_truth_lands_on_the_surface_that_the_picture_shows(model, surface, rom, cameras):
+def test_projected_truth_lands_on_the_surface_that_the_image_shows(model, surface, rom, cameras):
     """A visible vertex of the vermilion border projects to within a pixel of the red region."""
     camera, vertices = cameras["face2"], rom.vertices_mm(5)
     caster = RayCaster(vertices, model.triangles)
@@ -180,24 +180,24 @@ def test_the_inner_label_of_closed_lips_is_a_line(model, surface, cameras):
 def test_same_seed_same_bytes_whatever_the_chunk(rom, cameras, tmp_path):
     one = {name: cameras[name] for name in ("face2", "lip1")}
     noise = {"name": "s/rom", "seed": 4, "noise_read": 0.001, "noise_shot": 3e-5}
-    write_pictures(rom, one, tmp_path / "a", [0, 1], 0, **noise, **RAYS)
-    write_pictures(rom, one, tmp_path / "b", [1], 0, **noise, **RAYS)
+    write_images(rom, one, tmp_path / "a", [0, 1], 0, **noise, **RAYS)
+    write_images(rom, one, tmp_path / "b", [1], 0, **noise, **RAYS)
     for name in one:
-        first = sha256_of(picture_path(tmp_path / "a", name, 1))
-        assert first == sha256_of(picture_path(tmp_path / "b", name, 1))
-        assert first != sha256_of(picture_path(tmp_path / "a", name, 0))
+        first = sha256_of(image_path(tmp_path / "a", name, 1))
+        assert first == sha256_of(image_path(tmp_path / "b", name, 1))
+        assert first != sha256_of(image_path(tmp_path / "a", name, 0))
     other = noise | {"seed": 5}
-    write_pictures(rom, one, tmp_path / "c", [1], 0, **other, **RAYS)
-    assert first != sha256_of(picture_path(tmp_path / "c", "lip1", 1))
+    write_images(rom, one, tmp_path / "c", [1], 0, **other, **RAYS)
+    assert first != sha256_of(image_path(tmp_path / "c", "lip1", 1))
 
 
-def test_pictures_are_neither_black_nor_burnt_out(rom, cameras, tmp_path):
+def test_images_are_neither_black_nor_burnt_out(rom, cameras, tmp_path):
     noise = {"name": "s/rom", "seed": 4, "noise_read": 0.001, "noise_shot": 3e-5}
-    write_pictures(rom, {"face2": cameras["face2"]}, tmp_path, [0], 0, **noise, **RAYS)
-    picture = read_image(picture_path(tmp_path, "face2", 0))
-    middle = picture[60:140, 60:140]
+    write_images(rom, {"face2": cameras["face2"]}, tmp_path, [0], 0, **noise, **RAYS)
+    image = read_image(image_path(tmp_path, "face2", 0))
+    middle = image[60:140, 60:140]
     assert 0.08 < middle.mean() < 0.6  # linear
-    assert (picture >= 0.999).any(axis=2).mean() < 0.02
+    assert (image >= 0.999).any(axis=2).mean() < 0.02
 
 
 def test_the_capture_folder_is_what_a_rig_gives(model, rom, cameras, tmp_path):
@@ -228,7 +228,7 @@ def test_people_differ_from_frame_to_frame(model, surface):
     crowd = plan(model, role="video", last=3, performance="people")
     assert len(np.unique(crowd.identities[:, 0])) == 4
     cameras = cameras_of(crowd, "video", **SIZES)
-    shown = [pictures(crowd, surface, cameras, index=i)["cam"] for i in range(2)]
+    shown = [images(crowd, surface, cameras, index=i)["cam"] for i in range(2)]
     assert np.abs(shown[0] - shown[1]).mean() > 0.02
     for index in range(4):
         points = cameras["cam"].project(crowd.vertices_mm(index)[model.landmarks])

@@ -12,7 +12,7 @@ SKIN, LIP, DARK = (0.72, 0.55, 0.45), (0.66, 0.36, 0.36), (0.12, 0.08, 0.08)
 
 
 def ellipse(centre, half_width, half_height, n=120) -> np.ndarray:
-    """Closed polygon (n, 2) from the right corner (picture's left) over the top."""
+    """Closed polygon (n, 2) from the right corner (image's left) over the top."""
     angle = np.pi - np.linspace(0, 2 * np.pi, n, endpoint=False)
     return np.stack(
         [centre[0] + half_width * np.cos(angle), centre[1] - half_height * np.sin(angle)], axis=1
@@ -30,9 +30,9 @@ def draw_mouth(
     noise=0.01,
     seed=0,
 ):
-    """(linear picture (h, w, 3), landmarks (66, 2), label) of an elliptic mouth.
+    """(linear image (h, w, 3), landmarks (66, 2), label) of an elliptic mouth.
 
-    All lengths are half-axes in pixels, before the picture is scaled and turned about its centre
+    All lengths are half-axes in pixels, before the image is scaled and turned about its centre
     (`angle` in radians). The eyes' outer corners are 200 px apart.
     """
     rotation = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -46,9 +46,9 @@ def draw_mouth(
 
     inner_width = 0.75 * width
     lips, mouth = inside(width, height), inside(inner_width, max(opening, 0.7))
-    picture = np.asarray(SKIN) * (1 - lips) + np.asarray(LIP) * lips
-    picture = picture * (1 - mouth) + np.asarray(DARK) * mouth
-    picture += noise * np.random.default_rng(seed).standard_normal(picture.shape)
+    image = np.asarray(SKIN) * (1 - lips) + np.asarray(LIP) * lips
+    image = image * (1 - mouth) + np.asarray(DARK) * mouth
+    image += noise * np.random.default_rng(seed).standard_normal(image.shape)
 
     def place(points):
         return (np.asarray(points) - [120, 120]) @ rotation.T + middle
@@ -60,7 +60,7 @@ def draw_mouth(
     landmarks[[59, 60, 61]] = inner[[15, 30, 45]]
     landmarks[[63, 64, 65]] = inner[[75, 90, 105]]
     label = ContourLabel(Polyline(place(inner), True), Polyline(place(outer), True))
-    return srgb_to_linear(np.clip(picture, 0, 1)), place(landmarks), label
+    return srgb_to_linear(np.clip(image, 0, 1)), place(landmarks), label
 
 
 def crest(line_px, size=(240, 240), width_px=1.5, height=0.8) -> np.ndarray:

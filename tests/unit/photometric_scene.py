@@ -1,4 +1,4 @@
-"""A painted dome as a face model, and pictures of it: known pose, expression, light and albedo."""
+"""A painted dome as a face model, and images of it: known pose, expression, light and albedo."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def mesh_of(model: FaceModel, x: np.ndarray, offsets_mm: np.ndarray | float = 0.
     return local @ (rotation_of(x[:3]) @ FACING).T + x[3:6]
 
 
-def picture_of(model: FaceModel, vertices_mm: np.ndarray, camera: Camera = CAMERA) -> np.ndarray:
+def image_of(model: FaceModel, vertices_mm: np.ndarray, camera: Camera = CAMERA) -> np.ndarray:
     """Linear RGB (h, w, 3), lit by `LIGHT` on black."""
     hits = RayCaster(vertices_mm, model.triangles).see(camera)
     normals = normalised(

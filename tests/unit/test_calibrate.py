@@ -48,30 +48,30 @@ def board_poses(count: int, seed: int = 0) -> list[np.ndarray]:
 
 
 @cache
-def board_picture(board: Board) -> np.ndarray:
+def board_image(board: Board) -> np.ndarray:
     """The board at 8 pixels a millimetre, white all round it."""
     scale, (columns, rows) = 8, board.squares
     size = (int(columns * board.square_mm * scale), int(rows * board.square_mm * scale))
     if board.kind == "charuco":
-        picture = board.charuco().generateImage(size)
+        image = board.charuco().generateImage(size)
     else:
         y, x = np.mgrid[: size[1], : size[0]] // int(board.square_mm * scale)
-        picture = np.where((x + y) % 2 == 0, 0, 255).astype(np.uint8)
-    return picture
+        image = np.where((x + y) % 2 == 0, 0, 255).astype(np.uint8)
+    return image
 
 
 def render(board: Board, camera: Camera, world_from_board: np.ndarray, over: int = 4) -> np.ndarray:
-    """The board in a grey picture, box-filtered from `over` squared samples a pixel."""
-    picture = board_picture(board)
+    """The board in a grey image, box-filtered from `over` squared samples a pixel."""
+    image = board_image(board)
     corners_mm = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     corners_mm *= [board.squares[0] * board.square_mm, board.squares[1] * board.square_mm, 0]
     world = corners_mm @ world_from_board[:, :3].T + world_from_board[:, 3]
     target = camera.project(world) * over - 0.5
-    height, width = picture.shape
+    height, width = image.shape
     source = np.array([[0, 0], [width, 0], [width, height], [0, height]], float) - 0.5
     homography = cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32))
     large = cv2.warpPerspective(
-        picture, homography, (SIZE[0] * over, SIZE[1] * over),
+        image, homography, (SIZE[0] * over, SIZE[1] * over),
         flags=cv2.INTER_AREA, borderValue=200,
     )  # fmt: skip
     small = cv2.resize(large, SIZE, interpolation=cv2.INTER_AREA).astype(float)

@@ -27,7 +27,7 @@ def test_ray_of_a_projection_meets_the_point(cameras, name):
 def test_look_at_puts_target_in_the_middle_and_up_is_up(cameras):
     camera = cameras["a"]
     assert np.allclose(camera.project(np.zeros(3)), [320, 240])
-    assert camera.project(np.array([0, 10.0, 0]))[1] < 240  # y of the picture points down
+    assert camera.project(np.array([0, 10.0, 0]))[1] < 240  # y of the image points down
     assert np.allclose(camera.centre_mm, [50, 20, 700])
 
 

@@ -56,8 +56,8 @@ def covered_share(likelihood, line, threshold=0.3):
 
 
 def test_boosted_detector_finds_contours_of_a_mouth_it_has_not_seen(detector):
-    picture, landmarks, label = draw_mouth(9.0, 26.0, seed=9)
-    inner, outer = detector.likelihood(picture, landmarks)
+    image, landmarks, label = draw_mouth(9.0, 26.0, seed=9)
+    inner, outer = detector.likelihood(image, landmarks)
     assert crest_distance_px(outer, label.outer) < 1.2
     assert crest_distance_px(inner, label.inner) < 1.6
     assert covered_share(outer, label.outer) > 0.95
@@ -65,25 +65,25 @@ def test_boosted_detector_finds_contours_of_a_mouth_it_has_not_seen(detector):
 
 
 def test_detection_follows_scale_and_roll_of_the_face(detector):
-    picture, landmarks, label = draw_mouth(9.0, 26.0, scale=1.7, angle=0.5, size=(420, 420), seed=9)
-    inner, outer = detector.likelihood(picture, landmarks)
+    image, landmarks, label = draw_mouth(9.0, 26.0, scale=1.7, angle=0.5, size=(420, 420), seed=9)
+    inner, outer = detector.likelihood(image, landmarks)
     assert crest_distance_px(outer, label.outer) < 1.7 * 1.2
     assert crest_distance_px(inner, label.inner) < 1.7 * 1.6
     assert covered_share(outer, label.outer) > 0.9
 
 
 def test_closed_mouth_gives_one_inner_line(detector):
-    picture, landmarks, label = draw_mouth(1.0, 20.0, seed=4)
-    inner, _ = detector.likelihood(picture, landmarks)
+    image, landmarks, label = draw_mouth(1.0, 20.0, seed=4)
+    inner, _ = detector.likelihood(image, landmarks)
     assert crest_distance_px(inner, label.inner) < 1.5
 
 
 def test_saved_detector_answers_the_same(detector, tmp_path):
     detector.save(tmp_path / "detector.npz")
     again = load_detector(tmp_path / "detector.npz")
-    picture, landmarks, _ = draw_mouth(seed=5)
+    image, landmarks, _ = draw_mouth(seed=5)
     for a, b in zip(
-        detector.likelihood(picture, landmarks), again.likelihood(picture, landmarks), strict=True
+        detector.likelihood(image, landmarks), again.likelihood(image, landmarks), strict=True
     ):
         np.testing.assert_array_equal(a, b)
 
@@ -112,15 +112,15 @@ def test_a_damaged_or_newer_detector_is_refused(detector, tmp_path):
 
 
 def test_landmark_ridge_moves_from_biased_landmarks_to_the_lips():
-    picture, landmarks, label = draw_mouth(10.0, 26.0, seed=2)
+    image, landmarks, label = draw_mouth(10.0, 26.0, seed=2)
     mouth = landmarks[48:66].mean(axis=0)
     landmarks[48:58] = mouth + (landmarks[48:58] - mouth) * [1.0, 1.25]  # 6 px too high and low
-    inner, outer = LandmarkRidgeDetector().likelihood(picture, landmarks)
+    inner, outer = LandmarkRidgeDetector().likelihood(image, landmarks)
     assert crest_distance_px(outer, label.outer) < 2.0
     assert crest_distance_px(inner, label.inner) < 3.0
 
 
-def test_landmark_ridge_on_a_flat_picture_is_the_landmarks_curve():
+def test_landmark_ridge_on_a_flat_image_is_the_landmarks_curve():
     _, landmarks, _ = draw_mouth()
     flat = np.full((240, 240, 3), 0.2, dtype=np.float32)
     _, outer = LandmarkRidgeDetector(edge_weight=0.0).likelihood(flat, landmarks)
@@ -149,8 +149,8 @@ def test_features_are_exact_box_sums():
 
 
 def test_channels_do_not_depend_on_exposure():
-    picture = np.random.default_rng(1).uniform(0.05, 0.3, (40, 40, 3)).astype(np.float32)
-    np.testing.assert_allclose(image_channels(picture), image_channels(0.5 * picture), atol=2e-3)
+    image = np.random.default_rng(1).uniform(0.05, 0.3, (40, 40, 3)).astype(np.float32)
+    np.testing.assert_allclose(image_channels(image), image_channels(0.5 * image), atol=2e-3)
 
 
 def test_boosting_learns_an_interaction_that_no_single_split_can():
@@ -204,8 +204,8 @@ def test_pasted_region_lies_where_it_was_cut():
     _, landmarks, _ = draw_mouth(angle=0.2)
     region = mouth_region(landmarks, 200.0, 0.16)
     y, x = np.mgrid[0:240, 0:240] + 0.5
-    picture = np.stack([x, y, x + y], axis=-1).astype(np.float32)
-    back = region.paste(region.crop(picture)[..., 0], (240, 240))
+    image = np.stack([x, y, x + y], axis=-1).astype(np.float32)
+    back = region.paste(region.crop(image)[..., 0], (240, 240))
     assert np.abs(back - x)[140:160, 100:140].max() < 0.05
 
 

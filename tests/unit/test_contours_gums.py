@@ -17,25 +17,25 @@ STRIP_PX = 12.0  # of gum below the upper lip
 
 
 def draw_teeth(gums: bool):
-    """(picture, landmarks, upper border of the opening (n, 2)) of a wide open mouth.
+    """(image, landmarks, upper border of the opening (n, 2)) of a wide open mouth.
 
     Teeth hang from the upper lip, or from gums that come out of the lip's shade.
     """
-    picture, landmarks, label = draw_mouth(OPENING, 40.0, centre=CENTRE, noise=0.005)
+    image, landmarks, label = draw_mouth(OPENING, 40.0, centre=CENTRE, noise=0.005)
     y, x = np.mgrid[0:240, 0:240] + 0.5
     across, down = (x - CENTRE[0]) / WIDTH, y - CENTRE[1]
     top = -OPENING * np.sqrt(np.clip(1 - across**2, 0.0, 1.0))
     below = down - top  # of the upper lip's border
     inside = (np.abs(across) < 0.95) & (below > 0) & (np.hypot(across, down / OPENING) < 1)
     strip = STRIP_PX * np.sqrt(np.clip(1 - across**2, 0.0, 1.0)) if gums else 0.0
-    picture[inside & (below < 26)] = srgb_to_linear(TEETH)
-    picture[inside & (below < strip)] = srgb_to_linear(GUM)
+    image[inside & (below < 26)] = srgb_to_linear(TEETH)
+    image[inside & (below < strip)] = srgb_to_linear(GUM)
     if gums:
         shade = 1 - 0.8 * np.exp(-0.5 * (below / 4.0) ** 2) * (np.abs(across) < 0.95)
-        picture *= np.where(down < 0, shade, 1.0)[..., None]
+        image *= np.where(down < 0, shade, 1.0)[..., None]
     upper = label.inner.dense(1.0)
     upper = upper[(upper[:, 1] < CENTRE[1]) & (np.abs(upper[:, 0] - CENTRE[0]) < 0.7 * WIDTH)]
-    return picture.astype(np.float32), landmarks, upper
+    return image.astype(np.float32), landmarks, upper
 
 
 def crest_below_border_px(likelihood, border, reach=18):
@@ -50,9 +50,9 @@ def crest_below_border_px(likelihood, border, reach=18):
 @pytest.mark.parametrize("lower_px", [0.0, 6.0])
 @pytest.mark.parametrize("gums", [True, False])
 def test_the_upper_lip_ends_where_teeth_or_gums_begin(gums, lower_px):
-    picture, landmarks, border = draw_teeth(gums)
+    image, landmarks, border = draw_teeth(gums)
     landmarks[[59, 60, 61], 1] += lower_px  # as networks take gums for lip
-    inner, _ = LandmarkRidgeDetector().likelihood(picture, landmarks)
+    inner, _ = LandmarkRidgeDetector().likelihood(image, landmarks)
     offset, distance = crest_below_border_px(inner, border)
     assert abs(offset) < 1.5
     assert distance < 2.0
@@ -60,20 +60,20 @@ def test_the_upper_lip_ends_where_teeth_or_gums_begin(gums, lower_px):
 
 @pytest.mark.parametrize("opening", [0.7, 8.0, 22.0])
 def test_nothing_changes_without_gums(opening, monkeypatch):
-    picture, landmarks, _ = draw_mouth(opening, 40.0, seed=3)
+    image, landmarks, _ = draw_mouth(opening, 40.0, seed=3)
     if opening > 20:
-        picture, landmarks, _ = draw_teeth(gums=False)
-    found = LandmarkRidgeDetector().likelihood(picture, landmarks)
+        image, landmarks, _ = draw_teeth(gums=False)
+    found = LandmarkRidgeDetector().likelihood(image, landmarks)
     monkeypatch.setattr(ridges, "creases", lambda lightness, *_: (np.zeros(lightness.shape),) * 2)
-    without = LandmarkRidgeDetector().likelihood(picture, landmarks)
+    without = LandmarkRidgeDetector().likelihood(image, landmarks)
     # but for the mouth's corners, where lips touch
     changed = np.abs(np.subtract(found, without))[:, :, 90:150]
     assert changed.max() < 0.1
 
 
 def test_the_line_of_a_closed_mouth_is_not_gums():
-    picture, landmarks, _ = draw_mouth(0.7, 22.0, seed=4)
-    inner, _ = LandmarkRidgeDetector().likelihood(picture, landmarks)
+    image, landmarks, _ = draw_mouth(0.7, 22.0, seed=4)
+    inner, _ = LandmarkRidgeDetector().likelihood(image, landmarks)
     middle = inner[:, 100:141]
     np.testing.assert_allclose(middle.argmax(axis=0) + 0.5, 150.0, atol=1.5)
 

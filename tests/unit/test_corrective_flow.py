@@ -1,4 +1,4 @@
-"""Corrective flow (Mono13 7): known warps are found, meshes move as the picture asks."""
+"""Corrective flow (Mono13 7): known warps are found, meshes move as the image asks."""
 
 import cv2
 import numpy as np
@@ -23,7 +23,7 @@ CAMERA = pinhole(
 
 
 def skin(shape=(HEIGHT + 60, WIDTH + 60)) -> np.ndarray:
-    """A random picture with structure at several scales, display values."""
+    """A random image with structure at several scales, display values."""
     rng, total = np.random.default_rng(3), np.full((*shape, 3), 120, dtype=np.float32)
     for scale in (1.5, 4, 10):
         noise = cv2.GaussianBlur(rng.normal(size=(*shape, 3)).astype(np.float32), (0, 0), scale)
@@ -32,7 +32,7 @@ def skin(shape=(HEIGHT + 60, WIDTH + 60)) -> np.ndarray:
 
 
 def scene(step_px, corrective):
-    """Synthetic pictures that move by `step_px` a frame; true ones off by the flow (h, w, 2)."""
+    """Synthetic images that move by `step_px` a frame; true ones off by the flow (h, w, 2)."""
     base = skin()
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
 
@@ -42,16 +42,16 @@ def scene(step_px, corrective):
     back = np.zeros_like(corrective)
     for _ in range(30):
         back = -sample(corrective, x + back[..., 0], y + back[..., 1])
-    pictures = []
+    images = []
     for k in (0, 1, -1):
         dx, dy = k * step_px[0], k * step_px[1]
-        pictures.append(sample(base, x - dx + 30, y - dy + 30))
+        images.append(sample(base, x - dx + 30, y - dy + 30))
         u, v = sample(back[..., 0], x - dx, y - dy), sample(back[..., 1], x - dx, y - dy)
-        pictures.append(sample(base, x + u - dx + 30, y + v - dy + 30))
+        images.append(sample(base, x + u - dx + 30, y + v - dy + 30))
     motion = np.stack(
         [np.broadcast_to(np.float32(s), corrective.shape) for s in (step_px, -step_px)]
     )
-    return SixFrames(np.stack(pictures), np.ones((3, HEIGHT, WIDTH), dtype=bool), motion)
+    return SixFrames(np.stack(images), np.ones((3, HEIGHT, WIDTH), dtype=bool), motion)
 
 
 def known_flow():
@@ -78,7 +78,7 @@ def test_no_flow_where_the_synthetic_frames_are_right():
 def test_neighbouring_frames_carry_a_frame_that_shows_nothing_new():
     flow = known_flow()
     frames = scene(np.array([1.2, 0.5], dtype=np.float32), flow)
-    noisy = frames.pictures.copy()
+    noisy = frames.images.copy()
     noise = np.random.default_rng(0).normal(0, 25, noisy[1].shape).astype(np.float32)
     noisy[1] += noise
     frames = SixFrames(noisy, frames.masks, frames.motion)
@@ -90,7 +90,7 @@ def test_neighbouring_frames_carry_a_frame_that_shows_nothing_new():
     assert joined < 0.8 * single
 
 
-def test_pyramid_ends_before_pictures_become_too_small():
+def test_pyramid_ends_before_images_become_too_small():
     assert pyramid_sizes(480, 200) == [(480, 200), (240, 100), (120, 50), (60, 25)]
     assert pyramid_sizes(20, 20) == [(20, 20)]
 
@@ -146,7 +146,7 @@ def test_hidden_vertices_keep_their_shape_beside_those_that_follow():
     assert np.abs(shift - expected_mm).max() < 0.35  # the rest of the sheet goes along
 
 
-def test_head_motion_is_recovered_from_places_in_the_picture():
+def test_head_motion_is_recovered_from_places_in_the_image():
     local = CAMERA.to_camera(sheet()[0])
     rotation, translation = rotation_of(np.radians([2.0, -3.0, 1.0])), np.array([3.0, -2.0, 1.0])
     turned = local @ rotation.T
@@ -171,7 +171,7 @@ def test_one_vertex_of_each_square_is_chosen():
     assert len(np.unique(cells, axis=0)) == len(chosen) == 25
 
 
-def test_crop_sees_what_the_whole_picture_sees():
+def test_crop_sees_what_the_whole_image_sees():
     crop = Crop.around(CAMERA, np.array([[100.0, 60], [220, 200]]), 0.1, 80)
     assert max(crop.camera.width_px, crop.camera.height_px) == 80
     point = np.array([[5.0, -8, 10]])
@@ -180,6 +180,6 @@ def test_crop_sees_what_the_whole_picture_sees():
     assert np.abs(crop.camera.project(point) - expected).max() < 1e-6
 
 
-def test_face_outside_the_picture_is_refused():
-    with pytest.raises(ValueError, match="outside the picture"):
+def test_face_outside_the_image_is_refused():
+    with pytest.raises(ValueError, match="outside the image"):
         Crop.around(CAMERA, np.array([[-300.0, 10], [-200, 90]]), 0.05, 100)

@@ -1,4 +1,4 @@
-"""Renders of the report: surface stretch, cropped pictures, meshes with holes."""
+"""Renders of the report: surface stretch, cropped images, meshes with holes."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def test_a_sheet_has_a_row_a_view_and_leaves_holes_white():
         {"base": mesh}, {"base": np.zeros(mesh.shape[:2])}, face.triangles, 5.0
     )
     centre = np.zeros((2, 3))
-    picture = np.full((40, 40, 3), 7, np.uint8)
-    found = sheet(columns, [3, 9], centre, 150.0, 40, [picture, picture])
+    image = np.full((40, 40, 3), 7, np.uint8)
+    found = sheet(columns, [3, 9], centre, 150.0, 40, [image, image])
     assert found.shape == (4 * 40, 4 * 40, 3)
     assert (found[:40, :40] == 7).all()
     whole, holed = (found[rows, 40:80] < 250 for rows in (slice(80, 120), slice(0, 40)))
@@ -56,9 +56,9 @@ def test_a_sheet_has_a_row_a_view_and_leaves_holes_white():
 
 
 def test_a_crop_is_centred_and_white_outside():
-    picture = np.zeros((100, 100, 3), np.uint8)
-    picture[48:52, 18:22] = (0, 200, 0)
-    found = crop(picture, np.array([20.0, 50.0]), 80.0, 160)
+    image = np.zeros((100, 100, 3), np.uint8)
+    image[48:52, 18:22] = (0, 200, 0)
+    found = crop(image, np.array([20.0, 50.0]), 80.0, 160)
     assert found.shape == (160, 160, 3)
     green = np.argwhere(found[..., 1] > 100)
     green = green[(found[green[:, 0], green[:, 1], 0] < 100)]

@@ -12,7 +12,7 @@ from vermilion.export.overlay import (
     crop_round,
     join_videos,
     lip_colours,
-    overlay_picture,
+    overlay_image,
     strips_following,
 )
 from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
@@ -74,7 +74,7 @@ def test_usd_is_upright_for_a_video_whose_world_is_its_camera(tmp_path):
     write_usd(tmp_path / "a.usdc", np.array([0]), vertices, triangles, 25.0, pinhole("c", 9, 8, 8))
     stage = Usd.Stage.Open(str(tmp_path / "a.usdc"))
     root = UsdGeom.Xformable(stage.GetPrimAtPath("/Face")).ComputeLocalToWorldTransform(0.0)
-    assert root.TransformDir(Gf.Vec3d(0, -1, 0))[1] == pytest.approx(1.0)  # the picture's up
+    assert root.TransformDir(Gf.Vec3d(0, -1, 0))[1] == pytest.approx(1.0)  # the image's up
 
 
 def test_obj_keeps_order_and_coordinates(tmp_path):
@@ -96,18 +96,18 @@ def test_weights_have_time_in_seconds(tmp_path):
 
 
 def test_joined_video_has_all_frames_in_order(tmp_path):
-    pictures = [np.full((48, 64, 3), 20 * i, np.uint8) for i in range(11)]
-    write_video(tmp_path / "a.mp4", pictures[:4], 25.0)
-    write_video(tmp_path / "b.mp4", pictures[4:], 25.0)
+    images = [np.full((48, 64, 3), 20 * i, np.uint8) for i in range(11)]
+    write_video(tmp_path / "a.mp4", images[:4], 25.0)
+    write_video(tmp_path / "b.mp4", images[4:], 25.0)
     join_videos(tmp_path / "ab.mp4", [tmp_path / "a.mp4", tmp_path / "b.mp4"])
     reader = VideoReader(tmp_path / "ab.mp4")
     assert reader.n_frames == 11
-    for index, picture in enumerate(pictures):
-        assert np.abs(reader.read(index).astype(int) - picture).mean() < 4
+    for index, image in enumerate(images):
+        assert np.abs(reader.read(index).astype(int) - image).mean() < 4
 
 
-def test_crop_shows_the_mesh_where_the_whole_picture_has_it():
-    """The cropped camera projects to the cropped picture's pixels."""
+def test_crop_shows_the_mesh_where_the_whole_image_has_it():
+    """The cropped camera projects to the cropped image's pixels."""
     vertices, _ = sequence(1)
     camera = pinhole("cam", 1500.0, 640, 480)
     points = camera.project(vertices[0])
@@ -125,10 +125,10 @@ def test_overlay_has_a_column_a_mesh_and_says_what_is_not_tracked():
     vertices, triangles = sequence(1)
     camera = pinhole("cam", 1500.0, 640, 480)
     crop = crop_round(camera.project(vertices[0]), (640, 480), 0.2, 160)
-    picture = np.full((480, 640, 3), 120, np.uint8)
+    image = np.full((480, 640, 3), 120, np.uint8)
     colours = np.full((vertices.shape[1], 3), 0.8)
-    shown = overlay_picture(
-        picture, camera, [crop], [("base", vertices[0]), ("corrected", None)], triangles, colours,
+    shown = overlay_image(
+        image, camera, [crop], [("base", vertices[0]), ("corrected", None)], triangles, colours,
         1.0, "frame 0",
     )  # fmt: skip
     width, height = crop.size

@@ -108,13 +108,13 @@ def test_a_weak_ridge_beside_the_teeth_is_not_passed_over_for_the_other_lip():
         {"angle": -0.6, "scale": 1.3, "size": (380, 380)},
     ],
 )
-def test_distances_do_not_change_when_the_picture_moves_grows_or_turns(view):
+def test_distances_do_not_change_when_the_image_moves_grows_or_turns(view):
     _, _, label = draw_mouth(9.0, 26.0)
     model = mouth_model(7.0, 22.0, 50.0)
     expected = sampler(model).find(model.neutral_mm, facing_camera(), ridge_maps(label)).distances
     camera = facing_camera(**view)
-    picture_view = {k: v for k, v in view.items() if k != "shift"}
-    _, _, moved = draw_mouth(9.0, 26.0, **picture_view)
+    image_view = {k: v for k, v in view.items() if k != "shift"}
+    _, _, moved = draw_mouth(9.0, 26.0, **image_view)
     shift = view.get("shift", (0.0, 0.0))
     from vermilion.contours.labels import ContourLabel, Polyline
 

@@ -1,4 +1,4 @@
-"""Distances in the head frame do not change when the head turns; those in the picture do (Lips16 7)."""
+"""Distances in the head frame do not change when the head turns; those in the image do (Lips16 7)."""
 
 from __future__ import annotations
 

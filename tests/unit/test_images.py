@@ -1,4 +1,4 @@
-"""Pictures and frames: linear light, exact frames, errors that name the place."""
+"""Images and frames: linear light, exact frames, errors that name the place."""
 
 import cv2
 import numpy as np
@@ -33,7 +33,7 @@ def test_mid_grey_is_darker_in_linear_light():
 @pytest.mark.parametrize(("suffix", "step"), [(".png", 1 / 255), (".exr", 1e-3)])
 def test_image_round_trip(tmp_path, suffix, step):
     linear = np.random.default_rng(0).uniform(0, 1, (17, 23, 3)).astype(np.float32)
-    path = tmp_path / f"picture{suffix}"
+    path = tmp_path / f"image{suffix}"
     write_image(path, linear)
     assert image_size(path) == (23, 17)
     assert np.abs(linear_to_srgb(read_image(path)) - linear_to_srgb(linear)).max() <= step
@@ -47,7 +47,7 @@ def test_channels_keep_their_names(tmp_path):
     assert np.abs(back["inner"] - inner).max() < 1e-3
 
 
-def test_same_picture_gives_the_same_bytes(tmp_path):
+def test_same_image_gives_the_same_bytes(tmp_path):
     linear = np.random.default_rng(0).uniform(0, 1, (16, 16, 3))
     for name in ("a", "b"):
         write_image(tmp_path / f"{name}.png", linear)
@@ -84,10 +84,10 @@ def test_numbers_of_frames_are_read_from_usual_names(tmp_path):
 
 
 def test_every_frame_of_a_video_is_the_right_one(tmp_path):
-    def picture(i):
+    def image(i):
         return np.full((48, 64, 3), 10 * i + 20, dtype=np.uint8)
 
-    write_video(tmp_path / "clip.mp4", [picture(i) for i in range(20)], fps=25)
+    write_video(tmp_path / "clip.mp4", [image(i) for i in range(20)], fps=25)
     reader = VideoReader(tmp_path / "clip.mp4")
     assert (reader.n_frames, reader.size, reader.fps) == (20, (64, 48), 25.0)
     for i in (7, 3, 19, 0, 4, 5, 18):  # forth and back
@@ -103,15 +103,15 @@ def test_file_that_is_no_video_is_named(tmp_path):
         VideoReader(path)
 
 
-def test_same_pictures_give_the_same_video_whatever_lies_in_memory(tmp_path):
+def test_same_images_give_the_same_video_whatever_lies_in_memory(tmp_path):
     rng = np.random.default_rng(0)
     noise = cv2.GaussianBlur(rng.integers(0, 255, (729, 1133, 3), dtype=np.uint8), (0, 0), 5)
-    pictures = [noise[i : i + 689, i : i + 1093] for i in range(4)]
+    images = [noise[i : i + 689, i : i + 1093] for i in range(4)]
     path, written = tmp_path / "a.mp4", set()
     for value in range(6):
         litter = [np.full(size, value, np.uint8) for size in rng.integers(1_000, 3_000_000, 30)]
         del litter
-        write_video(path, pictures, fps=30)
+        write_video(path, images, fps=30)
         written.add(path.read_bytes())
     assert len(written) == 1
     assert VideoReader(path).size == (1092, 688)

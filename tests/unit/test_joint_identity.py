@@ -1,13 +1,17 @@
-"""A known person on known pictures: what pictures add to landmarks that are off."""
+"""A known person on known images: what images add to landmarks that are off."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.unit.photometric_scene import CAMERA, dome, mesh_of, motion, picture_of
+from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion
 from vermilion.appearance.samples import sample_skin
-from vermilion.tracking.identity.joint_identity import PictureSettings, _Round, fit_joint_identity
+from vermilion.tracking.identity.joint_identity import (
+    IdentityImageSettings,
+    _Round,
+    fit_joint_identity,
+)
 from vermilion.tracking.identity.landmark_identity import (
     IdentityProblem,
     IdentitySettings,
@@ -33,7 +37,7 @@ def model_with_identities():
 
 
 def scene(noise_px=3.0):
-    """(model, problem, pictures): landmarks of a person, off by the same in every frame."""
+    """(model, problem, images): landmarks of a person, off by the same in every frame."""
     model = model_with_identities()
     offsets = np.tensordot(PERSON, model.identities_mm, axes=1)
     truth = motion(3 * N_FRAMES)[::3]
@@ -48,19 +52,21 @@ def scene(noise_px=3.0):
     settings = IdentitySettings(
         fit=FitSettings(noise=loose, jaw_slide=1.0), bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2)
     )
-    pictures = [picture_of(model, mesh) for mesh in meshes]
-    return model, IdentityProblem(model, [sample], settings), pictures
+    images = [image_of(model, mesh) for mesh in meshes]
+    return model, IdentityProblem(model, [sample], settings), images
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    model, problem, pictures = scene()
-    settings = PictureSettings(spacing_mm=4.0, pixel_mm=2.0, strength=1000.0, albedo_prior=0.05)
-    joint = fit_joint_identity(model, problem, pictures, [CAMERA] * N_FRAMES, settings)
+    model, problem, images = scene()
+    settings = IdentityImageSettings(
+        spacing_mm=4.0, pixel_mm=2.0, strength=1000.0, albedo_prior=0.05
+    )
+    joint = fit_joint_identity(model, problem, images, [CAMERA] * N_FRAMES, settings)
     return model, problem, joint
 
 
-def test_pictures_bring_the_person_nearer_than_landmarks_that_are_off(fitted):
+def test_images_bring_the_person_nearer_than_landmarks_that_are_off(fitted):
     _, problem, joint = fitted
     landmarks = problem.result(*problem.solve()).identity
     assert np.abs(landmarks - PERSON).max() > 0.5  # else there is nothing to mend
@@ -73,11 +79,11 @@ def test_every_frame_is_explained_better(fitted):
 
 
 def test_a_step_goes_downhill_all_the_way():
-    model, problem, pictures = scene()
+    model, problem, images = scene()
     frames, shared = problem.solve()
-    settings = PictureSettings(spacing_mm=4.0, pixel_mm=2.0, strength=300.0)
+    settings = IdentityImageSettings(spacing_mm=4.0, pixel_mm=2.0, strength=300.0)
     held = _Round(
-        model, problem, sample_skin(model, 4.0), pictures, [CAMERA] * N_FRAMES, settings, frames,
+        model, problem, sample_skin(model, 4.0), images, [CAMERA] * N_FRAMES, settings, frames,
         shared,
     )  # fmt: skip
     step_frames, step_shared = held.newton_step(frames, shared)
@@ -88,9 +94,9 @@ def test_a_step_goes_downhill_all_the_way():
     assert whole < little
 
 
-def test_no_weight_of_the_pictures_is_the_landmark_fit():
-    model, problem, pictures = scene()
+def test_no_weight_of_the_images_is_the_landmark_fit():
+    model, problem, images = scene()
     plain = problem.result(*problem.solve())
-    off = PictureSettings(strength=0.0, rounds=1)
-    joint = fit_joint_identity(model, problem, pictures, [CAMERA] * N_FRAMES, off)
+    off = IdentityImageSettings(strength=0.0, rounds=1)
+    joint = fit_joint_identity(model, problem, images, [CAMERA] * N_FRAMES, off)
     assert np.abs(joint.person.identity - plain.identity).max() < 0.02

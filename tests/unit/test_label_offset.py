@@ -1,4 +1,4 @@
-"""Labels that lean to one side of the lips' border, held against the pictures."""
+"""Labels that lean to one side of the lips' border, held against the images."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_lean_of_a_label_is_measured(detector, lean_px):
         assert found == pytest.approx(lean_px, abs=0.5)
 
 
-def test_it_is_the_same_in_a_picture_twice_as_large(detector):
+def test_it_is_the_same_in_a_image_twice_as_large(detector):
     (frame,) = labelled(-2.0, scale=2.0)[:1]
     found = outer_offset(frame, detector, tuple(2.0 * ring for ring in tracked(0)))
     assert INTEROCULAR_PX * found == pytest.approx(-2.0, abs=0.5)

@@ -25,7 +25,7 @@ from vermilion.landmarks.key_frames import (
 
 
 @pytest.fixture
-def picture():
+def image():
     return np.random.default_rng(3).integers(0, 120, (20, 24)).astype(np.uint8)
 
 
@@ -49,27 +49,27 @@ def test_code_of_a_pixel_by_hand():
     assert lbp8(pixels)[1, 1] == 0b00001001
 
 
-def test_a_flat_picture_has_every_neighbour_not_darker():
+def test_a_flat_image_has_every_neighbour_not_darker():
     flat = np.full((6, 7), 77, dtype=np.uint8)
     assert (lbp8(flat) == 255).all() and (lbp4(flat) == 15).all()
 
 
-def test_brightness_and_contrast_do_not_change_codes(picture):
-    assert np.array_equal(lbp8(picture), lbp8(2 * picture + 10))
-    assert np.array_equal(lbp4(picture), lbp4(2 * picture + 10))
+def test_brightness_and_contrast_do_not_change_codes(image):
+    assert np.array_equal(lbp8(image), lbp8(2 * image + 10))
+    assert np.array_equal(lbp4(image), lbp4(2 * image + 10))
 
 
-def test_a_quarter_turn_of_the_picture_turns_the_codes(picture):
-    turned = np.rot90(lbp8(picture))  # counterclockwise, as the bits go
+def test_a_quarter_turn_of_the_image_turns_the_codes(image):
+    turned = np.rot90(lbp8(image))  # counterclockwise, as the bits go
     expected = (turned << 2) | (turned >> 6)
-    assert np.array_equal(lbp8(np.rot90(picture)), expected)
-    turned = np.rot90(lbp4(picture))
-    assert np.array_equal(lbp4(np.rot90(picture)), ((turned << 1) | (turned >> 3)) & 15)
+    assert np.array_equal(lbp8(np.rot90(image)), expected)
+    turned = np.rot90(lbp4(image))
+    assert np.array_equal(lbp4(np.rot90(image)), ((turned << 1) | (turned >> 3)) & 15)
 
 
-def test_histograms_are_shares_of_59_and_16_bins(picture):
+def test_histograms_are_shares_of_59_and_16_bins(image):
     boxes = np.array([[0, 0, 6, 5], [6, 5, 10, 10]])
-    found = histograms(uniform_code(lbp8(picture)), lbp4(picture), boxes)
+    found = histograms(uniform_code(lbp8(image)), lbp4(image), boxes)
     assert found.shape == (2, N_BINS) == (2, 75)
     assert np.allclose(found[:, :N_UNIFORM].sum(axis=1), 1)
     assert np.allclose(found[:, N_UNIFORM:].sum(axis=1), 1)

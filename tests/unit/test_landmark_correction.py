@@ -1,4 +1,4 @@
-"""Landmarks corrected by flow between key frames, on a picture that moves as a whole."""
+"""Landmarks corrected by flow between key frames, on an image that moves as a whole."""
 
 import cv2
 import numpy as np
@@ -18,10 +18,10 @@ SETTINGS = CorrectionSettings(face_px=120.0)
 
 @pytest.fixture(scope="module")
 def clip():
-    """Pictures of a textured face that moves evenly, and its true landmarks."""
+    """Images of a textured face that moves evenly, and its true landmarks."""
     rng = np.random.default_rng(2)
-    picture, points = drawn_face(rng)
-    grey = linear_to_srgb(picture).mean(axis=2).astype(np.float32)
+    image, points = drawn_face(rng)
+    grey = linear_to_srgb(image).mean(axis=2).astype(np.float32)
     texture = cv2.GaussianBlur(rng.normal(size=grey.shape).astype(np.float32), (0, 0), 1.5)
     grey = np.clip(grey + 0.5 * texture, 0, 1)
     greys, truth = [], []
@@ -52,7 +52,7 @@ def key_frames(points, rows, kinds):
 def reader(greys, unreadable=()):
     def read(frame):
         if frame in unreadable:
-            raise InputError("a damaged picture", "a picture", "Export it again.", frame=frame)
+            raise InputError("a damaged image", "an image", "Export it again.", frame=frame)
         return greys[frame]
 
     return read
@@ -116,7 +116,7 @@ def test_a_frame_without_a_face_is_filled_and_says_so(clip):
     assert np.linalg.norm(found.points_px[3] - truth[3], axis=-1).mean() < 0.4
 
 
-def test_a_damaged_picture_stays_without_landmarks_and_flow_goes_past_it(clip):
+def test_a_damaged_image_stays_without_landmarks_and_flow_goes_past_it(clip):
     greys, truth = clip
     track = without_face(detected(truth), [3])
     keys = key_frames(track.points_px, [0], [NEUTRAL])

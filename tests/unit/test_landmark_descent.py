@@ -26,7 +26,7 @@ from vermilion.landmarks.scheme import (
 )
 from vermilion.landmarks.training import (
     TrainingSettings,
-    labelled_pictures,
+    labelled_images,
     ridge_regression,
     train_descent,
 )
@@ -36,7 +36,7 @@ SETTINGS = TrainingSettings(stages=4, perturbations=4, seed=1)
 
 
 def drawn_face(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """A picture (150, 180, 3), linear RGB, of a drawn face, and its landmarks (66, 2) px."""
+    """An image (150, 180, 3), linear RGB, of a drawn face, and its landmarks (66, 2) px."""
     points = landmark_layout()[:, :2] * [1, -1]
     lower = np.array([53, 54, 55, 56, 57, 63, 64, 65])
     points[lower, 1] += rng.uniform(0, 14)
@@ -77,8 +77,8 @@ def test_faces_not_trained_on_are_found_within_two_hundredths_of_their_size(trai
     rng = np.random.default_rng(99)
     errors = []
     for _ in range(8):
-        picture, points = drawn_face(rng)
-        found = trained.detect(picture)
+        image, points = drawn_face(rng)
+        found = trained.detect(image)
         assert found.found
         errors.append(
             np.linalg.norm(found.points_px - points, axis=1).mean() / face_size_px(points)
@@ -88,9 +88,9 @@ def test_faces_not_trained_on_are_found_within_two_hundredths_of_their_size(trai
 
 
 @pytest.mark.slow
-def test_a_larger_picture_gives_the_same_landmarks_scaled(trained):
-    picture, points = drawn_face(np.random.default_rng(5))
-    large = cv2.resize(picture, None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC)
+def test_a_larger_image_gives_the_same_landmarks_scaled(trained):
+    image, points = drawn_face(np.random.default_rng(5))
+    large = cv2.resize(image, None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC)
     found = trained.detect(np.clip(large, 0, 1))
     assert found.found
     assert np.linalg.norm(found.points_px / 3 - points, axis=1).mean() < 2.5  # px
@@ -101,17 +101,17 @@ def test_no_face_is_found_where_there_is_none(trained):
     rng = np.random.default_rng(1)
     blank = np.full((150, 180, 3), 0.3, dtype=np.float32)
     noise = rng.uniform(0, 1, (150, 180, 3)).astype(np.float32)
-    for picture in (blank, noise):
-        found = trained.detect(picture)
+    for image in (blank, noise):
+        found = trained.detect(image)
         assert not found.found and np.isnan(found.points_px).all()
 
 
 @pytest.mark.slow
 def test_the_model_file_gives_the_same_landmarks_and_is_versioned(trained, tmp_path):
-    picture, _ = drawn_face(np.random.default_rng(2))
+    image, _ = drawn_face(np.random.default_rng(2))
     trained.save(tmp_path / "m.npz")
     again = DescentDetector.load(tmp_path / "m.npz")
-    assert np.allclose(again.detect(picture).points_px, trained.detect(picture).points_px)
+    assert np.allclose(again.detect(image).points_px, trained.detect(image).points_px)
     arrays = dict(np.load(tmp_path / "m.npz"))
     arrays["format_version"] = np.array(99)
     np.savez(tmp_path / "new.npz", **arrays)
@@ -121,7 +121,7 @@ def test_the_model_file_gives_the_same_landmarks_and_is_versioned(trained, tmp_p
 
 def test_too_few_labels_are_an_error_that_says_where_to_add_them():
     with pytest.raises(InputError, match="labels/landmarks"):
-        labelled_pictures([], 100)
+        labelled_images([], 100)
 
 
 def test_similarity_between_shapes_is_exact():
@@ -155,12 +155,12 @@ def test_heat_maps_are_decoded_to_their_cell_and_offset():
     assert points[5, 1] == pytest.approx(223 * (5 / 27 + shift), abs=0.01)
 
 
-def test_networks_take_srgb_at_224_pixels_normalised_whatever_the_picture_holds():
-    picture = np.linspace(-0.2, 1.3, 224 * 224 * 3, dtype=np.float32).reshape(224, 224, 3)
-    picture[5, 7] = np.nan
-    planes = network_input(picture)
-    picture[5, 7] = 0.0
-    expected = (linear_to_srgb(picture) - [0.485, 0.456, 0.406]) / [0.229, 0.224, 0.225]
+def test_networks_take_srgb_at_224_pixels_normalised_whatever_the_image_holds():
+    image = np.linspace(-0.2, 1.3, 224 * 224 * 3, dtype=np.float32).reshape(224, 224, 3)
+    image[5, 7] = np.nan
+    planes = network_input(image)
+    image[5, 7] = 0.0
+    expected = (linear_to_srgb(image) - [0.485, 0.456, 0.406]) / [0.229, 0.224, 0.225]
     # A hundredth of a step of 8 bits.
     assert np.abs(planes.transpose(1, 2, 0) - expected).max() < 0.01 / 255 / 0.229
     assert network_input(np.zeros((31, 45, 3), dtype=np.float32)).shape == (3, 224, 224)
@@ -175,12 +175,12 @@ def test_missing_networks_are_named(tmp_path):
 def test_networks_find_a_rendered_face_the_same_wherever_it_lies(data_root):
     detector = NetworkDetector(data_root / "landmarks66")
     source = open_frames(data_root / "capture-sample" / "captures" / "p1" / "phone")
-    picture = source.read("cam", 0)
-    found = detector.detect(picture)
+    image = source.read("cam", 0)
+    found = detector.detect(image)
     assert found.found and found.confidence.mean() > 0.7
-    moved = detector.detect(np.pad(picture, ((40, 0), (60, 0), (0, 0)), mode="edge"))
+    moved = detector.detect(np.pad(image, ((40, 0), (60, 0), (0, 0)), mode="edge"))
     size = face_size_px(found.points_px)
-    settled = NetworkDetector(data_root / "landmarks66", NetworkSettings(passes=6)).detect(picture)
+    settled = NetworkDetector(data_root / "landmarks66", NetworkSettings(passes=6)).detect(image)
     moves = np.linalg.norm(settled.points_px - found.points_px, axis=1)
     assert moves.mean() < 0.02 * size
     away = np.linalg.norm(moved.points_px - [60, 40] - found.points_px, axis=1)

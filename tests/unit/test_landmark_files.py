@@ -16,7 +16,7 @@ from vermilion.storage.errors import InputError
 
 
 def face_px():
-    """A frontal face in a picture, (66, 2) px."""
+    """A frontal face in an image, (66, 2) px."""
     return landmark_layout()[:, :2] * [1.5, -1.5] + [160.0, 140.0]
 
 

@@ -26,10 +26,10 @@ def crest_px(likelihood, line, reach=120):
 
 
 def test_inner_landmarks_on_the_lips_do_not_hold_the_contour():
-    picture, landmarks, label = draw_mouth(9.0, 28.0, seed=3)
+    image, landmarks, label = draw_mouth(9.0, 28.0, seed=3)
     centre = landmarks[48:66].mean(axis=0)
     landmarks[INNER] = centre + (landmarks[INNER] - centre) * [1.0, 1.8]  # 7 px too far apart
-    inner, outer = LandmarkRidgeDetector().likelihood(picture, landmarks)
+    inner, outer = LandmarkRidgeDetector().likelihood(image, landmarks)
     assert crest_px(outer, label.outer) < 1.0
     middle = np.abs(label.inner.points_px[:, 0] - 120) < 25
     points = label.inner.points_px[middle]
@@ -38,23 +38,23 @@ def test_inner_landmarks_on_the_lips_do_not_hold_the_contour():
 
 
 def test_a_closed_mouth_is_its_dark_line_though_the_upper_lip_is_in_shade():
-    picture, landmarks, label = draw_mouth(0.6, 22.0, seed=4)
+    image, landmarks, label = draw_mouth(0.6, 22.0, seed=4)
     y = np.arange(240)[:, None, None] + 0.5
     shade = 1 - 0.45 * np.clip((y - 132) / 18, 0, 1) * (
         y < 150
     )  # darker towards the seam, then bright
     landmarks[INNER, 1] -= 3.0
-    inner, _ = LandmarkRidgeDetector().likelihood(picture * shade, landmarks)
+    inner, _ = LandmarkRidgeDetector().likelihood(image * shade, landmarks)
     assert crest_px(inner, label.inner) < 1.5
 
 
 @pytest.mark.parametrize("height", [0.01, 0.5, 0.8], ids=["no tongue", "low", "high"])
 def test_a_tongue_between_the_lips_is_not_lip(height):
-    picture, landmarks, label = draw_mouth(11.0, 28.0, seed=5)
+    image, landmarks, label = draw_mouth(11.0, 28.0, seed=5)
     x, y = np.meshgrid(np.arange(240) + 0.5, np.arange(240) + 0.5)
     tongue = ((x - 120) / 24) ** 2 + ((y - 153) / (11 * height)) ** 2 < 1
     inside = ((x - 120) / 39) ** 2 + ((y - 150) / 10.5) ** 2 < 1
-    shown = linear_to_srgb(picture)
+    shown = linear_to_srgb(image)
     shown[tongue & inside] = np.asarray(TONGUE) + 0.01 * np.random.default_rng(0).standard_normal(
         (int((tongue & inside).sum()), 3)
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.photometric_scene import CAMERA, LIGHT, dome, mesh_of, motion, paint, picture_of
+from tests.unit.photometric_scene import CAMERA, LIGHT, dome, image_of, mesh_of, motion, paint
 from vermilion.export.makeup import MakeUp, colour_of_hex, lip_outline, lipstick, star
 
 MODEL = dome()
@@ -46,20 +46,20 @@ def test_star_has_five_tips():
 def test_lipstick_is_lit_as_the_skin_is_and_stays_on_the_lips():
     model, x = with_lips(), motion(1)[0]
     mesh = mesh_of(model, x)
-    picture = picture_of(model, mesh)
+    image = image_of(model, mesh)
     red = colour_of_hex("#9e0b2c")
     makeup = MakeUp(model, model.neutral_mm, LIGHT, paint(model), [lipstick("#9e0b2c", 1.0)])
-    made_up, checked = makeup.draw(picture, CAMERA, mesh)
+    made_up, checked = makeup.draw(image, CAMERA, mesh)
     pixels = CAMERA.project(mesh)
     at = np.rint(pixels - 0.5).astype(int)
     inside = lip_outline(model, model.neutral_mm)
     column, row = at[inside > 3].T
     # Red, as bright as the light there makes it.
-    drawn, skin = made_up[row, column], picture[row, column]
+    drawn, skin = made_up[row, column], image[row, column]
     light = skin / paint(model)[inside > 3]
     assert np.median(np.abs(drawn / (red * light) - 1)) < 0.05
     far = (inside < -3) & (np.abs(model.neutral_mm[:, :2]).max(axis=1) < 50)
     column, row = at[far].T
-    assert np.abs(made_up[row, column] - picture[row, column]).max() < 1e-6
-    assert np.abs(checked[row, column] - picture[row, column]).mean() > 0.05
-    assert made_up.shape == checked.shape == picture.shape
+    assert np.abs(made_up[row, column] - image[row, column]).max() < 1e-6
+    assert np.abs(checked[row, column] - image[row, column]).mean() > 0.05
+    assert made_up.shape == checked.shape == image.shape

@@ -19,7 +19,7 @@ FRAMES = range(4)
 CAMERAS = ("a", "b", "c")
 
 
-def picture(seed: int, size=(24, 32)) -> np.ndarray:
+def image(seed: int, size=(24, 32)) -> np.ndarray:
     return np.random.default_rng(seed).integers(0, 255, (*size, 3), dtype=np.uint8)
 
 
@@ -27,7 +27,7 @@ def picture(seed: int, size=(24, 32)) -> np.ndarray:
 def capture(tmp_path):
     for i, camera in enumerate(CAMERAS):
         for frame in FRAMES:
-            write_srgb8(tmp_path / "frames" / camera / f"{frame:06d}.png", picture(10 * i + frame))
+            write_srgb8(tmp_path / "frames" / camera / f"{frame:06d}.png", image(10 * i + frame))
     up = np.array([0.0, 1.0, 0.0])
     rig = {
         name: pinhole(name, 40.0, 32, 24, look_at(np.array([i * 50.0, 0, 500]), np.zeros(3), up))
@@ -61,13 +61,13 @@ def test_chunks_say_what_the_whole_take_says(capture):
     assert parts[1].bad == whole.bad == {"b": {2: "missing"}}
 
 
-def test_every_bad_picture_is_named_and_the_take_goes_on(capture):
+def test_every_bad_image_is_named_and_the_take_goes_on(capture):
     frames = capture / "frames"
     (frames / "a/000001.png").unlink()
     whole = (frames / "b/000002.png").read_bytes()
     (frames / "b/000002.png").write_bytes(whole[: len(whole) // 2])
     (frames / "b/000003.png").write_bytes(b"")
-    write_srgb8(frames / "c/000000.png", picture(1, (20, 32)))
+    write_srgb8(frames / "c/000000.png", image(1, (20, 32)))
     shutil.copy(__file__, frames / "c/000003.png")
     manifest = manifest_of(capture)
     assert manifest.bad["a"] == {1: "missing"}
@@ -82,18 +82,18 @@ def test_every_bad_picture_is_named_and_the_take_goes_on(capture):
 def test_everything_that_stops_a_take_is_listed_at_once(capture):
     shutil.rmtree(capture / "frames/a")
     for frame in FRAMES:
-        write_srgb8(capture / f"frames/c/{frame:06d}.png", picture(frame, (48, 64)))
+        write_srgb8(capture / f"frames/c/{frame:06d}.png", image(frame, (48, 64)))
     with pytest.raises(InputError) as error:
         manifest_of(capture)
     message = str(error.value)
     assert "2 problem(s)" in message and "subject s1, take t1" in message
-    assert "camera a" in message and "no picture" in message
-    assert "camera c" in message and "pictures of 64x48" in message and "32x24" in message
+    assert "camera a" in message and "no image" in message
+    assert "camera c" in message and "images of 64x48" in message and "32x24" in message
 
 
 def test_a_video_is_checked_frame_by_frame(tmp_path):
     path = tmp_path / "clip.mp4"
-    write_video(path, [picture(i, (48, 64)) for i in range(5)], fps=25)
+    write_video(path, [image(i, (48, 64)) for i in range(5)], fps=25)
     manifest = capture_manifest(path, "s1", "t1", [2, 3, 4, 5], ["cam"], hash_decoded=True)
     assert manifest.kind == "video" and manifest.video["frames"] == 5
     assert manifest.cameras["cam"]["width_px"] == 64

@@ -27,7 +27,7 @@ def frame_of(number, vertices, missing=()):
 
 @pytest.fixture(scope="module")
 def scene():
-    """The neutral's pictures, and those of another frame that misses a camera."""
+    """The neutral's images, and those of another frame that misses a camera."""
     model, rest = lip_patch.face_model(), lip_patch.vertices_at(0.0, 0.0)
     truth = lip_patch.vertices_at(*POSE)
     return Origin.of(frame_of(0, rest), rest, model), frame_of(1, truth, ["left"]), truth
@@ -56,7 +56,7 @@ def test_a_slip_across_the_line_of_sight_is_measured(scene, slip_mm):
     assert found.loc[ALL, "difference_vermilion"] > 1.3 * still.loc[ALL, "difference_vermilion"]
 
 
-def test_a_camera_without_a_picture_is_named(scene):
+def test_a_camera_without_a_image_is_named(scene):
     found = rows(*scene)
     assert found.loc["left", "reason"] == "no image of this frame"
     assert np.isnan(found.loc["left", "drift_px_skin"])

@@ -57,25 +57,25 @@ def test_points_that_fewer_than_two_views_trust_are_unknown():
     assert found.valid.sum() == 65
 
 
-def test_sampling_a_linear_picture_is_exact_at_many_points():
+def test_sampling_a_linear_image_is_exact_at_many_points():
     y, x = np.mgrid[:50, :60].astype(np.float32)
     points = np.random.default_rng(0).uniform(1, 49, (70_000, 2))
     found = sample(x + 0.5 + 10 * (y + 0.5), points)
     assert np.abs(found - (points[:, 0] + 10 * points[:, 1])).max() < 0.2  # remap: 1/32 pixel
 
 
-def test_undistorted_picture_agrees_with_the_pinhole():
+def test_undistorted_image_agrees_with_the_pinhole():
     params = (800.0, 805.0, 80.0, 60.0, -0.2, 0.05, 0.001, -0.002)
     bent = replace(RIG["b"], model="OPENCV", params=params)
     grid = bent.pixel_grid()
     origins, directions = bent.rays(grid)
     image = (origins[..., 0] + 400 * directions[..., 0]).astype(np.float32)  # smooth in the world
-    straight, picture = undistorted(bent, image)
+    straight, image = undistorted(bent, image)
     points = np.random.default_rng(2).uniform(-25, 25, (100, 3))
     assert straight.is_pinhole
     _, expected = straight.rays(straight.project(points))
     inside = straight.in_image(straight.project(points), 12)
-    found = sample(picture, straight.project(points))[inside]
+    found = sample(image, straight.project(points))[inside]
     world = origins[0, 0, 0] + 400 * expected[inside, 0]
     assert np.abs(found - world).max() < 0.02
 
@@ -93,7 +93,7 @@ class Source:
         return np.full(size, 0.5, np.float32)
 
 
-def test_cameras_without_a_usable_picture_are_noted_and_the_rest_go_on():
+def test_cameras_without_a_usable_image_are_noted_and_the_rest_go_on():
     frame = load_frame(Source(broken=("b",), small=("d",)), RIG, 7, 8.0, 0.01)
     assert list(frame.views) == ["a", "c"]
     assert "truncated" in frame.missing["b"]

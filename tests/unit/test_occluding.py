@@ -1,4 +1,4 @@
-"""What hides the mouth: the inner contour in the picture moves over the lips as they roll."""
+"""What hides the mouth: the inner contour in the image moves over the lips as they roll."""
 
 import numpy as np
 import pytest

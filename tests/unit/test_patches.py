@@ -18,7 +18,7 @@ def on_plane(camera, pixels):
     return origins - ((origins @ NORMAL) / (directions @ NORMAL))[:, None] * directions
 
 
-def picture(camera, texture, gain):
+def image(camera, texture, gain):
     """A plane with a texture of 0.2 mm a texel, (h, w) grey levels."""
     where = on_plane(camera, camera.pixel_grid().reshape(-1, 2))[:, :2] / 0.2 + 300
     where = where.reshape(camera.height_px, camera.width_px, 2).astype(np.float32)
@@ -37,7 +37,7 @@ def scene():
         for name, xy in places.items()
     }
     gains = {"front": 1.0, "left": 0.7, "right": 1.2}
-    return rig, {name: picture(rig[name], texture, gains[name]) for name in rig}
+    return rig, {name: image(rig[name], texture, gains[name]) for name in rig}
 
 
 def noisy_tracks(rig, sigma_px, seed=0):

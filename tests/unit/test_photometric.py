@@ -1,10 +1,10 @@
-"""Dense refinement on pictures of a painted dome, whose pose, expression and light are known."""
+"""Dense refinement on images of a painted dome, whose pose, expression and light are known."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from tests.unit.photometric_scene import LIGHT, dome, mesh_of, motion, picture_of, take_start
+from tests.unit.photometric_scene import LIGHT, dome, image_of, mesh_of, motion, take_start
 from vermilion.appearance.estimate import Sightings, estimate_appearance
 from vermilion.appearance.harmonics import harmonics, harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
@@ -80,7 +80,7 @@ def scene():
     face = start.face(samples)
     rows = range(N_FRAMES, 2 * N_FRAMES)
     views = [
-        start.view(row, picture_of(MODEL, mesh_of(MODEL, truth[row])), face, 1.0, 3) for row in rows
+        start.view(row, image_of(MODEL, mesh_of(MODEL, truth[row])), face, 1.0, 3) for row in rows
     ]
     appearance = learn_appearance(np.array(rows), views, face, samples, 0.2, 0, lambda found: None)
     rng = np.random.default_rng(5)
@@ -99,10 +99,10 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
     face = start.face(samples)
-    pictures = [picture_of(MODEL, mesh_of(MODEL, row)) for row in truth]
+    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     problem = FrameProblem(face, appearance, SETTINGS, 0.5)
     found = refine_frames(
-        start, np.ones(N_FRAMES, dtype=bool), lambda row: pictures[row], problem, 1.0
+        start, np.ones(N_FRAMES, dtype=bool), lambda row: images[row], problem, 1.0
     )
     refined = take_positions(start, found["x"])
     before = np.linalg.norm(in_pixels(off) - in_pixels(truth), axis=2).mean()
@@ -110,8 +110,8 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
     assert before > 1.5  # px, at 2.4 px/mm
     assert after < 0.25
     assert found["refined"].all()
-    for row, picture in enumerate(pictures):
-        view = start.view(row, picture, face, 1.0, 1)
+    for row, image in enumerate(images):
+        view = start.view(row, image, face, 1.0, 1)
         residual = [
             photometric_residual(*sample_errors(view, x, face, appearance)[:2])
             for x in (start.x[row], found["x"][row])
@@ -150,15 +150,15 @@ def test_layer_follows_what_the_model_cannot_make(scene):
     bulge = near[:, None] * np.array([2.0, -1.0, 0.0])
     start = take_start(MODEL, truth, truth)
     face = start.face(samples)
-    picture = picture_of(MODEL, mesh_of(MODEL, truth[0], bulge))
-    view = start.view(0, picture, face, 1.0, 3)
+    image = image_of(MODEL, mesh_of(MODEL, truth[0], bulge))
+    view = start.view(0, image, face, 1.0, 3)
     layer = CorrectiveLayer(MODEL, MODEL.neutral_mm, face, appearance, LayerSettings())
     found = layer.solve(view)
     missed = np.linalg.norm(found - bulge, axis=1)
     assert near @ missed < 0.3 * near @ np.linalg.norm(bulge, axis=1)
     in_camera = found @ (rotation_of(view.start[:3]) @ view.reference).T
     assert np.abs(in_camera[:, 2]).max() < 1e-9
-    still = layer.solve(start.view(0, picture_of(MODEL, mesh_of(MODEL, truth[0])), face, 1.0, 3))
+    still = layer.solve(start.view(0, image_of(MODEL, mesh_of(MODEL, truth[0])), face, 1.0, 3))
     assert np.linalg.norm(still, axis=1).mean() < 0.15  # mm
 
 

@@ -31,7 +31,7 @@ def test_what_lies_behind_is_hidden():
     assert visible.tolist() == [True, False, True]
 
 
-def test_point_outside_the_picture_is_not_visible():
+def test_point_outside_the_image_is_not_visible():
     assert not RayCaster(SQUARE * 10, TWO).visible(camera(), np.array([[300.0, 0, 0]]))[0]
 
 

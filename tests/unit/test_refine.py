@@ -1,4 +1,4 @@
-"""Refinement of a rig over tracks: on known points, and on pictures with known cameras."""
+"""Refinement of a rig over tracks: on known points, and on images with known cameras."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def points() -> np.ndarray:
     return np.concatenate([xy, depth[:, None]], axis=1)
 
 
-def pictures_of(rig, points, noise_px: float, seed: int = 0) -> dict:
+def images_of(rig, points, noise_px: float, seed: int = 0) -> dict:
     """What each camera sees of the points: features whose descriptors name the point."""
     rng = np.random.default_rng(seed)
     names = rng.normal(size=(len(points), 128)).astype(np.float32)
@@ -89,32 +89,32 @@ def true_error_px(true, other, points) -> float:
 
 def test_poses_off_by_a_third_of_a_degree_and_a_millimetre_are_recovered(rig, points):
     given = perturbed(rig)
-    made = refine_cameras(given, pictures_of(rig, points, 0.1), MatchSettings(), RefineSettings())
+    made = refine_cameras(given, images_of(rig, points, 0.1), MatchSettings(), RefineSettings())
     assert made.applied
     assert true_error_px(rig, given, points) > 5.0
     assert true_error_px(rig, made.cameras, points) < 0.2
     assert made.after_px["median"] < 0.2 < 2.0 < made.before_px["median"]
-    again = refine_cameras(given, pictures_of(rig, points, 0.1), MatchSettings(), RefineSettings())
+    again = refine_cameras(given, images_of(rig, points, 0.1), MatchSettings(), RefineSettings())
     for name, camera in made.cameras.items():
         assert np.array_equal(camera.cam_from_world, again.cameras[name].cam_from_world)
         assert camera.params == given[name].params
 
 
 def test_exact_cameras_are_left_alone(rig, points):
-    made = refine_cameras(rig, pictures_of(rig, points, 0.3), MatchSettings(), RefineSettings())
+    made = refine_cameras(rig, images_of(rig, points, 0.3), MatchSettings(), RefineSettings())
     assert not made.applied and "are good" in made.reason
     assert all(made.cameras[name] is camera for name, camera in rig.items())
 
 
 def test_exact_cameras_are_not_replaced_even_when_refinement_is_asked_for(rig, points):
-    pictures = pictures_of(rig, points, 0.3)
-    made = refine_cameras(rig, pictures, MatchSettings(), RefineSettings(), only_if_off=False)
+    images = images_of(rig, points, 0.3)
+    made = refine_cameras(rig, images, MatchSettings(), RefineSettings(), only_if_off=False)
     assert not made.applied and "no clear gain" in made.reason
 
 
 def test_too_few_features_say_so(rig, points):
     made = refine_cameras(
-        perturbed(rig), pictures_of(rig, points[:40], 0.1), MatchSettings(), RefineSettings()
+        perturbed(rig), images_of(rig, points[:40], 0.1), MatchSettings(), RefineSettings()
     )
     assert not made.applied and "at least 100 are needed" in made.reason
 

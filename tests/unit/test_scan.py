@@ -209,7 +209,7 @@ def test_what_is_no_scan_is_said_so(tmp_path, name, text, message):
 class Blind:
     """A detector that finds nothing."""
 
-    def detect(self, picture):
+    def detect(self, image):
         return Landmarks.none()
 
 

@@ -34,18 +34,18 @@ def rings(opening, height, outer_px=0.0, inner_px=0.0):
 
 def learnt(detector=None, outer_px=6.0, inner_px=3.0, reach=0.08):
     detector = detector or TrackRidgeDetector()
-    pictures, regions = [], []
+    images, regions = [], []
     for seed, (opening, height) in enumerate(SHAPES):
-        picture, landmarks, _ = draw_mouth(opening, height, seed=seed)
+        image, landmarks, _ = draw_mouth(opening, height, seed=seed)
         regions.append(detector.region(landmarks, rings(opening, height, outer_px, inner_px)))
-        pictures.append(regions[-1].crop(picture))
-    return learn_borders(detector, pictures, regions, reach)
+        images.append(regions[-1].crop(image))
+    return learn_borders(detector, images, regions, reach)
 
 
-def borders_px(detector, picture, landmarks, lips):
-    """Outer and inner border in the picture."""
+def borders_px(detector, image, landmarks, lips):
+    """Outer and inner border in the image."""
     region = detector.region(landmarks, lips)
-    colours = blurred_colours(region.crop(picture))
+    colours = blurred_colours(region.crop(image))
     outer = loop_spline(detector.outer_border(colours, region)[0])
     return tuple(
         region.to_image(curve)
@@ -66,31 +66,31 @@ def test_what_all_frames_share_is_learnt(outer_px):
 
 
 def test_borders_of_a_frame_that_was_not_learnt_from(detector):
-    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
-    outer, inner = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 6.0, 3.0))
+    image, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    outer, inner = borders_px(detector, image, landmarks, rings(8.0, 27.0, 6.0, 3.0))
     assert distance_to_polyline(outer, label.outer.points_px, True).mean() < 0.7
     assert distance_to_polyline(inner, label.inner.points_px, True).mean() < 1.2
 
 
 def test_a_frame_may_leave_the_takes_border_by_its_reach(detector):
-    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
-    outer, _ = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 9.0, 3.0))
+    image, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    outer, _ = borders_px(detector, image, landmarks, rings(8.0, 27.0, 9.0, 3.0))
     assert distance_to_polyline(outer, label.outer.points_px, True).mean() < 1.2
-    far, _ = borders_px(detector, picture, landmarks, rings(8.0, 27.0, 30.0, 3.0))
+    far, _ = borders_px(detector, image, landmarks, rings(8.0, 27.0, 30.0, 3.0))
     assert distance_to_polyline(far, label.outer.points_px, True).mean() > 15.0
 
 
 @pytest.mark.parametrize("rolled_px", [-9.0, 9.0])
 def test_a_rolled_lip_is_found_where_it_ends(detector, rolled_px):
     """Tracks do not follow rolls: the ring keeps the height of lips that are rolled in or out."""
-    picture, landmarks, label = draw_mouth(6.0, 25.0, seed=9)
+    image, landmarks, label = draw_mouth(6.0, 25.0, seed=9)
     tracked = rings(6.0, 25.0 - rolled_px, 0.0, 3.0)
     tracked[0][40:] = rings(6.0, 25.0)[0][40:]  # the upper lip alone
     start = tracked[0] + 6.0 * outward_normals(tracked[0])  # what all frames share
     along = slice(5, 36)
     for reach, most in ((0.05, 1.0), (0.0001, np.inf)):
         found = replace(detector, lip_reach=reach)
-        outer, _ = borders_px(found, picture, landmarks, (start, tracked[1]))
+        outer, _ = borders_px(found, image, landmarks, (start, tracked[1]))
         away = distance_to_polyline(
             outer[3 * along.start : 3 * along.stop], label.outer.points_px, True
         )
@@ -125,7 +125,7 @@ def test_parts_of_a_mouth_are_full_in_their_middles_and_the_corners_belong_to_no
 
 def test_a_corner_that_comes_in_is_found(detector):
     """Tracks keep mouths that open wide too wide."""
-    picture, landmarks, label = draw_mouth(14.0, 30.0, seed=9)
+    image, landmarks, label = draw_mouth(14.0, 30.0, seed=9)
     outer, inner = rings(14.0, 30.0, 0.0, 3.0)
     out = outer + 6.0 * outward_normals(outer)
     out += 10.0 * mouth_parts(80)[2][:, None] * outward_normals(outer)
@@ -133,7 +133,7 @@ def test_a_corner_that_comes_in_is_found(detector):
     error = []
     for reach in (0.05, 0.0001):
         found = replace(detector, lip_reach=reach)
-        border, _ = borders_px(found, picture, landmarks, (out, inner))
+        border, _ = borders_px(found, image, landmarks, (out, inner))
         error.append(distance_to_polyline(border[near], label.outer.points_px, True).mean())
     assert error[0] < 0.5
     assert error[1] > 1.5
@@ -150,17 +150,17 @@ def test_halves_that_pass_each_other_meet():
 
 
 def test_a_shadow_that_one_light_casts_on_the_skin_is_not_lip(detector):
-    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    image, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
     rows = np.arange(240)
     shade = np.where((rows > 183) & (rows < 189), 0.5, 1.0)[:, None, None]  # under the lower lip
     lips = rings(8.0, 27.0, 6.0, 3.0)
-    outer, _ = borders_px(detector, picture * shade, landmarks, lips)
+    outer, _ = borders_px(detector, image * shade, landmarks, lips)
     assert distance_to_polyline(outer, label.outer.points_px, True).max() < 3.5
 
 
 def test_maps_are_ridges_about_the_true_contours(detector):
-    picture, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
-    maps = detector.likelihood(picture, landmarks, rings(8.0, 27.0, 6.0, 3.0))
+    image, landmarks, label = draw_mouth(8.0, 27.0, seed=9)
+    maps = detector.likelihood(image, landmarks, rings(8.0, 27.0, 6.0, 3.0))
     for plane, line in zip(maps, (label.inner, label.outer), strict=True):
         rows, columns = np.nonzero(plane > 0.5 * plane.max())
         points = np.stack([columns, rows], axis=1) + 0.5
@@ -173,8 +173,8 @@ def test_the_least_reaches_and_the_least_region_serve():
         interocular_size_px=60.0, reach=0.001, frame_reach=0.001, lip_reach=0.001
     )
     found = learnt(detector, outer_px=0.0, inner_px=0.0, reach=0.001)
-    picture, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
-    maps = found.likelihood(picture, landmarks, rings(8.0, 27.0))
+    image, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
+    maps = found.likelihood(image, landmarks, rings(8.0, 27.0))
     assert all(np.isfinite(plane).all() and plane.max() > 0.3 for plane in maps)
 
 
@@ -201,11 +201,11 @@ def test_the_file_says_all(detector, tmp_path):
     detector.save(tmp_path / "detector.npz")
     again = load_detector(tmp_path / "detector.npz")
     assert isinstance(again, TrackRidgeDetector)
-    picture, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
+    image, landmarks, _ = draw_mouth(8.0, 27.0, seed=9)
     lips = rings(8.0, 27.0, 6.0, 3.0)
     for one, other in zip(
-        detector.likelihood(picture, landmarks, lips),
-        again.likelihood(picture, landmarks, lips),
+        detector.likelihood(image, landmarks, lips),
+        again.likelihood(image, landmarks, lips),
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)

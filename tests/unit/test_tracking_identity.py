@@ -90,7 +90,7 @@ def test_uniform_growth_is_taken_out():
 
 
 def test_identity_does_not_depend_on_the_world_turning():
-    """The same pictures turned in the plane give the same person."""
+    """The same images turned in the plane give the same person."""
     turned = sample()
     turn = rotation_of(np.array([0, 0, 0.3]))[:2, :2]
     rolled = Observations(turned.seen.image @ turn.T, turned.seen.trust, turned.seen.valid)

@@ -32,7 +32,7 @@ def true_motion(n_frames=N_FRAMES):
     return rotation, translation, weights
 
 
-def pictures(rotation, translation, weights, noise_px=0.0, seed=0):
+def images(rotation, translation, weights, noise_px=0.0, seed=0):
     points = SHAPE.points(weights) @ np.swapaxes(rotation, 1, 2) + translation[:, None]
     image = project(points, FOCAL_PX)
     image = image + noise_px * np.random.default_rng(seed).normal(size=image.shape)
@@ -46,7 +46,7 @@ def angle_deg(a, b):
 
 def test_clean_landmarks_give_pose_and_weights_back():
     truth = true_motion()
-    found = fit_motion(SHAPE, pictures(*truth), FOCAL_PX, FPS, LOOSE)
+    found = fit_motion(SHAPE, images(*truth), FOCAL_PX, FPS, LOOSE)
     assert angle_deg(found.rotation, truth[0]).max() < 0.05
     assert np.abs(found.translation_mm - truth[1]).max() < 0.5
     assert np.abs(found.weights - truth[2]).max() < 0.01
@@ -55,7 +55,7 @@ def test_clean_landmarks_give_pose_and_weights_back():
 
 def test_noisy_landmarks_cost_little_with_neutral_settings():
     truth = true_motion()
-    found = fit_motion(SHAPE, pictures(*truth, noise_px=2.0), FOCAL_PX, FPS)
+    found = fit_motion(SHAPE, images(*truth, noise_px=2.0), FOCAL_PX, FPS)
     assert angle_deg(found.rotation, truth[0]).max() < 2.5
     assert np.abs(found.weights - truth[2]).mean() < 0.06
     lateral_mm = np.abs(found.translation_mm - truth[1])[:, :2]
@@ -65,7 +65,7 @@ def test_noisy_landmarks_cost_little_with_neutral_settings():
 def test_weights_stay_in_the_box_where_the_face_leaves_it():
     rotation, translation, weights = true_motion()
     weights = 2.5 * weights - 0.75
-    found = fit_motion(SHAPE, pictures(rotation, translation, weights), FOCAL_PX, FPS, LOOSE)
+    found = fit_motion(SHAPE, images(rotation, translation, weights), FOCAL_PX, FPS, LOOSE)
     assert found.weights.min() >= 0.0
     assert found.weights.max() <= 1.0
     assert found.weights.max() == pytest.approx(1.0)
@@ -73,10 +73,10 @@ def test_weights_stay_in_the_box_where_the_face_leaves_it():
 
 def test_one_bad_landmark_does_not_move_the_head():
     rotation, translation, weights = true_motion()
-    seen = pictures(rotation, translation, weights)
+    seen = images(rotation, translation, weights)
     seen.image[:, 30] += [120.0, -80.0]
     found = fit_motion(SHAPE, seen, FOCAL_PX, FPS)
-    clean = fit_motion(SHAPE, pictures(rotation, translation, weights), FOCAL_PX, FPS)
+    clean = fit_motion(SHAPE, images(rotation, translation, weights), FOCAL_PX, FPS)
     assert angle_deg(found.rotation, clean.rotation).max() < 0.6
     assert np.abs(found.weights - clean.weights).mean() < 0.02
 
@@ -84,7 +84,7 @@ def test_one_bad_landmark_does_not_move_the_head():
 def test_smoothing_has_no_lag():
     """The same frames in reverse give the same motion in reverse."""
     truth = true_motion()
-    seen = pictures(*truth, noise_px=2.0)
+    seen = images(*truth, noise_px=2.0)
     settings = FitSettings(weight_acceleration=10.0, iterations=60, tolerance_mm=1e-5)
     found = fit_motion(SHAPE, seen, FOCAL_PX, FPS, settings)
     back = fit_motion(SHAPE, seen[np.arange(N_FRAMES)[::-1]], FOCAL_PX, FPS, settings)
@@ -94,7 +94,7 @@ def test_smoothing_has_no_lag():
 
 def test_smoothing_lowers_jitter():
     truth = true_motion()
-    seen = pictures(*truth, noise_px=2.0)
+    seen = images(*truth, noise_px=2.0)
     rough = fit_motion(SHAPE, seen, FOCAL_PX, FPS, LOOSE)
     smooth = fit_motion(SHAPE, seen, FOCAL_PX, FPS)
 
@@ -106,7 +106,7 @@ def test_smoothing_lowers_jitter():
 
 def test_frames_without_landmarks_are_interpolated():
     rotation, translation, weights = true_motion()
-    seen = pictures(rotation, translation, weights)
+    seen = images(rotation, translation, weights)
     gap = slice(18, 21)
     seen.valid[gap], seen.trust[gap], seen.image[gap] = False, 0.0, 0.0
     found = fit_motion(SHAPE, seen, FOCAL_PX, FPS)
@@ -117,14 +117,14 @@ def test_frames_without_landmarks_are_interpolated():
 
 def test_frames_without_landmarks_at_the_ends_hold_still():
     rotation, translation, weights = true_motion()
-    seen = pictures(rotation, translation, weights)
+    seen = images(rotation, translation, weights)
     seen.valid[-10:], seen.trust[-10:] = False, 0.0
     found = fit_motion(SHAPE, seen, FOCAL_PX, FPS)
     assert np.abs(found.translation_mm[-10:] - found.translation_mm[-11]).max() < 1.0
 
 
 def test_no_landmarks_at_all_is_an_error_that_says_what_to_do():
-    seen = pictures(*true_motion(3))
+    seen = images(*true_motion(3))
     seen.valid[:] = False
     with pytest.raises(InputError, match="landmark overlays"):
         fit_motion(SHAPE, seen, FOCAL_PX, FPS)
@@ -132,5 +132,5 @@ def test_no_landmarks_at_all_is_an_error_that_says_what_to_do():
 
 def test_a_single_frame_is_enough():
     truth = true_motion(1)
-    found = fit_motion(SHAPE, pictures(*truth), FOCAL_PX, FPS, LOOSE)
+    found = fit_motion(SHAPE, images(*truth), FOCAL_PX, FPS, LOOSE)
     assert np.abs(found.weights - truth[2]).max() < 0.01

@@ -32,7 +32,7 @@ def test_nearest_rotation_undoes_scale_and_is_proper():
     assert np.isclose(np.linalg.det(nearest_rotation(np.diag([1.0, 1.0, -0.1]))), 1)
 
 
-def test_scaled_orthographic_pose_is_exact_on_scaled_orthographic_pictures():
+def test_scaled_orthographic_pose_is_exact_on_scaled_orthographic_images():
     points = landmark_layout()
     wanted = rotation_of(np.array([0.1, 0.5, -0.2])) @ np.diag([1.0, -1.0, -1.0])
     image = 2.3 * points @ wanted[:2].T + [31.0, -12.0]

@@ -21,7 +21,7 @@ AFTER_TRACKING = AFTER_CONTOURS | {
     "appearance", "photometric", "photometric_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
-    "landmarks", "picture_identity", "tracking", "tracking_topology", "contour_detector", "contours",
+    "landmarks", "image_identity", "tracking", "tracking_topology", "contour_detector", "contours",
 }  # fmt: skip
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
@@ -147,12 +147,12 @@ def test_refinement_switched_off(finished):
 
 def test_identity_from_landmarks_alone(finished):
     def change(content):
-        content["tracking"]["identity"]["pictures"] = {"enabled": False}
+        content["tracking"]["identity"]["images"] = {"enabled": False}
 
     with configured(finished, change):
         jobs = set(finished.would_run())
     assert {"identity", "tracking", "tracking_meshes", "train"} <= jobs
-    assert not jobs & {"picture_identity", "landmarks", "inpaint"}
+    assert not jobs & {"image_identity", "landmarks", "inpaint"}
 
 
 def test_relief_of_a_take(finished):
@@ -178,7 +178,7 @@ def test_line_of_code_in_the_tracking_module(finished):
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
         jobs = set(finished.would_run())
     contours = {"contour_detector", "contours"}  # they start from the track or are held against it
-    assert jobs == AFTER_TRACKING | contours | {"picture_identity", "tracking", "tracking_topology"}
+    assert jobs == AFTER_TRACKING | contours | {"image_identity", "tracking", "tracking_topology"}
 
 
 def test_camera_file(finished):

@@ -18,12 +18,12 @@ def test_a_scan_changes_the_model_of_its_subject_alone(fresh_project):
     jobs = jobs_of(run.stdout + run.stderr)
     made_by_scan = [made for rule, _, made in jobs if rule == "scan"]
     assert [made.count("subjects/s1/") for made in made_by_scan] == [4]
-    # A model from a scan has no identities for pictures to choose from.
+    # A model from a scan has no identities for images to choose from.
     assert {rule for rule, _, made in jobs if "s1/identity.npz" in made} == {"identity"}
     for rule in ("identity", "tracking", "tracking_meshes", "correspondence", "evaluate"):
         inputs = {"s1": "", "s2": ""}
         for name, given, made in jobs:
-            if name.removeprefix("picture_") == rule:
+            if name.removeprefix("image_") == rule:
                 inputs["s1" if "/s1" in made else "s2"] += given
         assert "subjects/s1/tracker.npz" in inputs["s1"], rule
         assert "face/tracker.npz" not in inputs["s1"], rule

@@ -91,7 +91,7 @@ rule apply:
         mem_mb=1500,
         runtime=60,
     params:
-        cfg=cfg_of("apply.overlay", "correction.integration", "correction.picture"),
+        cfg=cfg_of("apply.overlay", "correction.integration", "correction.image"),
         code=code_of("apply/apply"),
         frames=lambda wildcards: frames_in(wildcards.chunk),
         fps=lambda wildcards: take_of(wildcards).fps,
@@ -137,7 +137,7 @@ rule makeup:
         corrected=APPLIED + "/chunks/{chunk}.npy",
     output:
         video=APPLIED + "/makeup/{chunk}.mp4",
-        picture=APPLIED + "/makeup/{chunk}.png",
+        image=APPLIED + "/makeup/{chunk}.png",
     log:
         R + "/logs/makeup/{subject}-{take}-{chunk}.log",
     benchmark:
@@ -156,10 +156,10 @@ rule makeup:
 
 
 rule makeup_join:
-    """Joins the make-up of a take: makeup.mp4, and a picture of its first chunk."""
+    """Joins the make-up of a take: makeup.mp4, and an image of its first chunk."""
     input:
         videos=per_chunk(APPLIED + "/makeup/{chunk}.mp4"),
-        pictures=per_chunk(APPLIED + "/makeup/{chunk}.png"),
+        images=per_chunk(APPLIED + "/makeup/{chunk}.png"),
     output:
         video=report(
             APPLIED + "/makeup.mp4",
@@ -167,7 +167,7 @@ rule makeup_join:
             labels={"take": "{subject}/{take}, make-up"},
             caption="../report/makeup.rst",
         ),
-        picture=APPLIED + "/makeup.png",
+        image=APPLIED + "/makeup.png",
     log:
         R + "/logs/makeup_join/{subject}-{take}.log",
     benchmark:

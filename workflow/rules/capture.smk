@@ -1,4 +1,4 @@
-"""Captures as they come (Lips16 3.1): checked pictures and calibrated cameras of every take."""
+"""Captures as they come (Lips16 3.1): checked images and calibrated cameras of every take."""
 
 from functools import cache
 
@@ -9,7 +9,7 @@ from vermilion.imaging.video import VIDEO_SUFFIXES
 
 @cache
 def capture_files(source):
-    """Frame -> pictures of that frame, of a capture folder or a folder of frames."""
+    """Frame -> images of that frame, of a capture folder or a folder of frames."""
     rig = Path(source) / "frames"
     folders = sorted(rig.glob("*/")) if rig.is_dir() else [Path(source)]
     files = {}
@@ -20,7 +20,7 @@ def capture_files(source):
 
 
 def camera_files(source):
-    """The calibration that a capture brings: COLMAP text, or pictures of a board."""
+    """The calibration that a capture brings: COLMAP text, or images of a board."""
     source = Path(source)
     if (source / "cameras").is_dir():
         return sorted(str(path) for path in (source / "cameras").glob("*.txt"))
@@ -29,27 +29,27 @@ def camera_files(source):
 
 
 def capture_inputs(wildcards):
-    """Pictures of a chunk that exist, and the calibration; a missing picture is the job's to name."""
+    """Images of a chunk that exist, and the calibration; a missing image is the job's to name."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        pictures = studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
-        return pictures + studio_cameras(wildcards.subject, wildcards.take)
+        images = studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
+        return images + studio_cameras(wildcards.subject, wildcards.take)
     if Path(take.source).suffix.lower() in VIDEO_SUFFIXES:
         return [take.source]
     files = capture_files(take.source)
-    pictures = [path for frame in frames_in(wildcards.chunk) for path in files.get(frame, [])]
-    return pictures + camera_files(take.source)
+    images = [path for frame in frames_in(wildcards.chunk) for path in files.get(frame, [])]
+    return images + camera_files(take.source)
 
 
 def camera_inputs(wildcards):
-    """The calibration of a take: its files, or what the studio writes beside its pictures."""
+    """The calibration of a take: its files, or what the studio writes beside its images."""
     if take_of(wildcards).source == STUDIO:
         return studio_cameras(wildcards.subject, wildcards.take)
     return camera_files(source_of(wildcards))
 
 
 rule capture:
-    """Checks every picture of a chunk whole: capture/{chunk}.json, quality rows, contact sheet."""
+    """Checks every image of a chunk whole: capture/{chunk}.json, quality rows, contact sheet."""
     input:
         capture_inputs,
     output:

@@ -125,7 +125,7 @@ def expand_chunks(pattern, subject, take):
 
 
 def source_of(wildcards):
-    """Where the pictures of a take lie: what the sheet says, or the studio's capture folder."""
+    """Where the images of a take lie: what the sheet says, or the studio's capture folder."""
     take = take_of(wildcards)
     if take.source == STUDIO:
         return f"{R}/captures/{take.subject}/{take.take}"
@@ -133,7 +133,7 @@ def source_of(wildcards):
 
 
 def mono_inputs(wildcards):
-    """Inputs of a job that reads the monocular pictures of a chunk (use with `unpack`)."""
+    """Inputs of a job that reads the monocular images of a chunk (use with `unpack`)."""
     folder = f"{R}/takes/{wildcards.subject}/{wildcards.take}"
     inputs = {"manifest": f"{folder}/capture/{wildcards.chunk}.json"}
     if take_of(wildcards).role == "tattoo":
@@ -142,7 +142,7 @@ def mono_inputs(wildcards):
 
 
 def mono_source(wildcards):
-    """What `open_frames` opens for the monocular pictures: inpainted frames of a tattoo take."""
+    """What `open_frames` opens for the monocular images: inpainted frames of a tattoo take."""
     if take_of(wildcards).role == "tattoo":
         return f"{R}/takes/{wildcards.subject}/{wildcards.take}/inpaint/{wildcards.chunk}"
     return source_of(wildcards)
@@ -155,7 +155,7 @@ def tracker_of(wildcards):
     return f"{R}/face/tracker.npz"
 
 
-def mono_pictures(wildcards):
+def mono_images(wildcards):
     """Checked manifests of all chunks of a take, and its inpainted frames if it has a tattoo."""
     folder = R + "/takes/{subject}/{take}"
     name = (wildcards.subject, wildcards.take)
@@ -166,7 +166,7 @@ def mono_pictures(wildcards):
 
 
 def mono_sources(wildcards):
-    """What `open_frames` opens for the monocular pictures of a whole take."""
+    """What `open_frames` opens for the monocular images of a whole take."""
     if take_of(wildcards).role == "tattoo":
         pattern = R + "/takes/{subject}/{take}/inpaint/{chunk}"
         return expand_chunks(pattern, wildcards.subject, wildcards.take)

@@ -36,7 +36,7 @@ rule contour_detector:
     """Trains the inner and outer contour detectors of a take: contours/detector.npz, quality of labels."""
     input:
         unpack(tracked_lips),
-        pictures=mono_pictures,
+        images=mono_images,
         landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         labels=contour_labels,
     output:

@@ -28,7 +28,7 @@ rule correspondence:
         coarse=of_reference_take(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
         fit=of_reference_take(R + "/takes/{subject}/{take}/tracking/fit.npz"),
         landmarks=of_reference_take(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
-        picture=of_reference_take(R + "/takes/{subject}/{take}/inpaint/{chunk}"),
+        image=of_reference_take(R + "/takes/{subject}/{take}/inpaint/{chunk}"),
     output:
         correspondence=R + "/subjects/{subject}/correspondence.npz",
         quality=R + "/subjects/{subject}/correspondence/quality/neutral.tsv",

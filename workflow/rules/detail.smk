@@ -23,7 +23,7 @@ def detail_outputs():
 rule detail_flow:
     """Corrects C of a chunk by flow from textured to true frames: detail/flow/{chunk}.npy."""
     input:
-        unpack(take_pictures),
+        unpack(take_images),
         tracker=tracker_of,
         fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
         coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),

@@ -72,7 +72,7 @@ rule evaluate:
             "evaluation.contour",
             "evaluation.figures.map_frames",
             "correction.integration",
-            "correction.picture",
+            "correction.image",
         ),
         code=code_of("evaluation/evaluate"),
         frames=lambda wildcards: take_of(wildcards).test_frames(),
@@ -111,7 +111,7 @@ rule evaluate_reconstruction:
 rule evaluation_figures:
     """Renders, surface stretch and errors from front and side, curves over time (fig. 9 to 16)."""
     input:
-        pictures=mono_pictures,
+        images=mono_images,
         maps=EVALUATED + "/maps.npz",
         frames=EVALUATED + "/frames.tsv",
     output:

@@ -111,7 +111,7 @@ def key_frame_csv(wildcards):
 
 
 rule landmarks:
-    """Finds the landmarks of a chunk of the monocular pictures, each by itself."""
+    """Finds the landmarks of a chunk of the monocular images, each by itself."""
     input:
         unpack(mono_inputs),
         detector=detector_files,
@@ -143,7 +143,7 @@ if CONFIG.landmarks.correction.mode == "flow":
     rule landmarks_key_frames:
         """Chooses the key frames of a take by local binary patterns (Mono13 5.2)."""
         input:
-            pictures=mono_pictures,
+            images=mono_images,
             landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
             labels=given_landmark_labels,
             csv=key_frame_csv,
@@ -168,7 +168,7 @@ if CONFIG.landmarks.correction.mode == "flow":
     rule landmarks_corrected:
         """Corrects the landmarks of a chunk by flow between key frames (Mono13 5.3)."""
         input:
-            pictures=mono_pictures,
+            images=mono_images,
             landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
             key_frames=LANDMARKS + "/key_frames.npz",
         output:

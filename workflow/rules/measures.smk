@@ -42,10 +42,10 @@ rule measures:
             labels={"take": "RBF network against affine map"},
             caption="../report/figure16.rst",
         ),
-        picture=report(
+        image=report(
             R + "/evaluation/table1.png",
             category="Tables",
-            labels={"table": "table 1, picture"},
+            labels={"table": "table 1, image"},
             caption="../report/table1.rst",
         ),
     log:

@@ -54,7 +54,7 @@ def first_take(wildcards):
 
 
 def first_neutral(wildcards):
-    """Neutral, cameras and pictures of the person's first take, for the later ones (`unpack`)."""
+    """Neutral, cameras and images of the person's first take, for the later ones (`unpack`)."""
     first = first_take(wildcards)
     if first is None:
         return {}
@@ -185,7 +185,7 @@ rule multiview_track:
 
 
 rule multiview_refine:
-    """Registers each frame of a chunk to the neutral's pictures: H/{chunk}.npy (Lips16 3.1)."""
+    """Registers each frame of a chunk to the neutral's images: H/{chunk}.npy (Lips16 3.1)."""
     input:
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",
@@ -216,7 +216,7 @@ rule multiview_refine:
 
 
 rule multiview_drift:
-    """Compares each frame of a chunk with the neutral's pictures, carried by the mesh: drift/{chunk}.tsv."""
+    """Compares each frame of a chunk with the neutral's images, carried by the mesh: drift/{chunk}.tsv."""
     input:
         template=R + "/face/template.npz",
         cameras=R + "/takes/{subject}/{take}/cameras",

@@ -1,7 +1,7 @@
-"""Dense refinement of the track by its pictures: analysis by synthesis (Lips16 3.2).
+"""Dense refinement of the track by its images: analysis by synthesis (Lips16 3.2).
 
 Appearance of a take (lighting, albedo), then pose and expression of each frame, joined over time to
-tracking/fit.npz, then the corrective layer; and how much of the picture each step explains.
+tracking/fit.npz, then the corrective layer; and how much of the image each step explains.
 """
 
 TRACKING = R + "/takes/{subject}/{take}/tracking"
@@ -14,8 +14,8 @@ def refinement_steps():
     return ["landmarks", *steps] if steps else []
 
 
-def take_pictures(wildcards):
-    """Inputs of a job that reads monocular pictures of a whole take (use with `unpack`)."""
+def take_images(wildcards):
+    """Inputs of a job that reads monocular images of a whole take (use with `unpack`)."""
     folder = R + "/takes/{subject}/{take}"
     inputs = {"manifests": per_chunk(folder + "/capture/{chunk}.json")(wildcards)}
     if take_of(wildcards).role == "tattoo":
@@ -24,8 +24,8 @@ def take_pictures(wildcards):
 
 
 def take_source(wildcards):
-    """What `open_frames` opens for the monocular pictures of a whole take."""
-    return take_pictures(wildcards).get("inpainted") or source_of(wildcards)
+    """What `open_frames` opens for the monocular images of a whole take."""
+    return take_images(wildcards).get("inpainted") or source_of(wildcards)
 
 
 def ablation_tables(wildcards=None):
@@ -43,7 +43,7 @@ def ablation_tables(wildcards=None):
 rule appearance:
     """Estimates the lighting and the albedo of a take: tracking/appearance.npz."""
     input:
-        unpack(take_pictures),
+        unpack(take_images),
         tracker=tracker_of,
         identity=R + "/subjects/{subject}/identity.npz",
         fit=landmark_fit(),
@@ -148,7 +148,7 @@ rule corrective_layer:
 
 
 rule residuals:
-    """How much of the pictures of a chunk each step leaves unexplained: residuals/<step>/."""
+    """How much of the images of a chunk each step leaves unexplained: residuals/<step>/."""
     input:
         unpack(mono_inputs),
         unpack(mesh_offsets),

@@ -52,7 +52,7 @@ def quality_files():
 
 
 def stage_overlays():
-    """[stage, what, file] of the pictures that the page shows: the first chunk of every take."""
+    """[stage, what, file] of the images that the page shows: the first chunk of every take."""
     rows = [["correspondence", s, f"{R}/subjects/{s}/correspondence/overlay/neutral.png"]
             for s in subjects("tattoo")]  # fmt: skip
     rows += [["scan", s, f"{R}/subjects/{s}/scan/overlay/scan.png"] for s in CONFIG.tracking.scans]
@@ -142,7 +142,7 @@ rule summary:
         table2=R + "/evaluation/table2.tsv",
         table3=R + "/evaluation/table3.tsv",
         estimators=R + "/evaluation/estimators.tsv",
-        picture=R + "/evaluation/table1.png",
+        image=R + "/evaluation/table1.png",
         figure16=R + "/evaluation/figure16.png",
         quality=R + "/quality.tsv",
         maps=of_takes(EVALUATED + "/error_maps.png", evaluated_takes()),
@@ -181,7 +181,7 @@ rule summary:
             "studio.seed",
             "correspondence",
             "correction.integration",
-            "correction.picture",
+            "correction.image",
             "training",
         ),
         code=code_of("report/summary"),

@@ -73,7 +73,7 @@ def take_span(wildcards):
 rule shading_light:
     """One light, albedo and noise of a take from its first frames: detail/shading/light.npz."""
     input:
-        unpack(take_pictures),
+        unpack(take_images),
         tracker=tracker_of,
         fit=TRACKING + "/fit.npz",
         meshes=meshes_before_shading,
@@ -104,7 +104,7 @@ rule shading_light:
 rule shading_relief:
     """Relief of each frame of a chunk: detail/shading/relief/{chunk}.npz."""
     input:
-        unpack(take_pictures),
+        unpack(take_images),
         tracker=tracker_of,
         fit=TRACKING + "/fit.npz",
         meshes=chunk_before_shading,
@@ -139,7 +139,7 @@ rule shading_relief:
 rule shading_meshes:
     """Relief with averaged normals, as meshes and normal maps: detail/shading/{chunk}.npy."""
     input:
-        unpack(take_pictures),
+        unpack(take_images),
         tracker=tracker_of,
         fit=TRACKING + "/fit.npz",
         meshes=chunk_before_shading,

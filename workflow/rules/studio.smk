@@ -1,6 +1,6 @@
 """Synthetic captures (embedded default): capture folders as a real rig gives, their truth apart.
 
-A chunk's pictures are named one by one, so that a lost or damaged one is made again. As Snakemake
+A chunk's images are named one by one, so that a lost or damaged one is made again. As Snakemake
 wants to know the names of outputs beforehand, there is one rule a take and chunk, and `take` and
 `chunk` are read here, not from wildcards.
 """
@@ -27,7 +27,7 @@ STUDIO_CAMERA_KEYS = (
     "lip_view_mm",
     "video_view_mm",
 )
-STUDIO_PICTURE_KEYS = (
+STUDIO_IMAGE_KEYS = (
     "occlusion_directions",
     "light_samples",
     "edge_samples",
@@ -105,7 +105,7 @@ def studio_cameras(subject, take):
 
 
 def studio_outputs():
-    """Every picture, camera and label of the studio's takes; the truth comes with them."""
+    """Every image, camera and label of the studio's takes; the truth comes with them."""
     paths = []
     for take in [take for take in TAKES if take.source == STUDIO]:
         for chunk in chunks(take.subject, take.take):
@@ -115,7 +115,7 @@ def studio_outputs():
 
 
 def studio_frames(subject, take, chunk):
-    """Pictures of a chunk of a studio take."""
+    """Images of a chunk of a studio take."""
     role = _TAKES[f"{subject}/{take}"].role
     return [
         f"{R}/captures/{subject}/{take}/frames/{camera}/{frame:06d}.png"
@@ -164,7 +164,7 @@ for take in [take for take in TAKES if take.source == STUDIO]:
     for chunk in chunks(take.subject, take.take):
 
         rule:
-            # The pictures of one chunk of a take, from all cameras.
+            # The images of one chunk of a take, from all cameras.
             name:
                 f"studio_take_{take.subject}_{take.take}_{chunk.replace('-', '_')}"
             input:
@@ -183,7 +183,7 @@ for take in [take for take in TAKES if take.source == STUDIO]:
             params:
                 cfg={
                     "plan": studio_plan(take),
-                    "pictures": studio_values(STUDIO_PICTURE_KEYS),
+                    "images": studio_values(STUDIO_IMAGE_KEYS),
                     "name": take.name,
                     "frames": frames_in(chunk),
                 },

@@ -62,7 +62,7 @@ def subject_outputs():
     paths += [
         f"{R}/subjects/{subject}/overlay/identity.png"
         for subject in tracked
-        if subject in pictured_subjects()
+        if subject in imaged_subjects()
     ]
     for subject in subjects("tattoo"):
         paths.append(f"{R}/subjects/{subject}/plain_texture.exr")

@@ -48,16 +48,16 @@ def sampled_takes(wildcards):
     ]
 
 
-def pictured_subjects():
-    """Subjects whose identity pictures tell of: a model that a scan gave has none to choose from."""
-    if not CONFIG.tracking.identity.pictures.enabled:
+def imaged_subjects():
+    """Subjects whose identity images tell of: a model that a scan gave has none to choose from."""
+    if not CONFIG.tracking.identity.images.enabled:
         return set()
     return {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
 
 
-def from_pictures():
+def from_images():
     """Regular expression of these subjects (none: matches nothing)."""
-    names = sorted(subject.replace(".", r"\.") for subject in pictured_subjects())
+    names = sorted(subject.replace(".", r"\.") for subject in imaged_subjects())
     return "|".join(names) or "(?!)"
 
 
@@ -85,40 +85,40 @@ rule identity:
         "../scripts/tracking/identity.py"
 
 
-rule picture_identity:
-    """Finds the person in landmarks and pictures together: subjects/{subject}/identity.npz."""
+rule image_identity:
+    """Finds the person in landmarks and images together: subjects/{subject}/identity.npz."""
     input:
         tracker=tracker_of,
         landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
         cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
         calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
-        pictures=lambda wildcards: [
-            path for take in identity_takes(wildcards) for path in mono_pictures(take)
+        images=lambda wildcards: [
+            path for take in identity_takes(wildcards) for path in mono_images(take)
         ],
     output:
         identity=R + "/subjects/{subject}/identity.npz",
         overlay=R + "/subjects/{subject}/overlay/identity.png",
     log:
-        R + "/logs/picture_identity/{subject}.log",
+        R + "/logs/image_identity/{subject}.log",
     benchmark:
-        R + "/benchmarks/picture_identity/{subject}.tsv"
+        R + "/benchmarks/image_identity/{subject}.tsv"
     wildcard_constraints:
-        subject=from_pictures(),
+        subject=from_images(),
     resources:
         mem_mb=1500,
         runtime=30,
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
-        code=code_of("tracking/picture_identity"),
+        code=code_of("tracking/image_identity"),
         takes=lambda wildcards: [
             row | {"source": mono_sources(take)}
             for row, take in zip(sampled_takes(wildcards), identity_takes(wildcards))
         ],
     script:
-        "../scripts/tracking/picture_identity.py"
+        "../scripts/tracking/image_identity.py"
 
 
-ruleorder: picture_identity > identity
+ruleorder: image_identity > identity
 
 
 def landmark_fit(wildcards=None):
@@ -160,7 +160,7 @@ rule tracking:
 
 
 rule tracking_meshes:
-    """Writes C of a chunk in the world, and the model over the pictures: tracking/C/{chunk}.npy."""
+    """Writes C of a chunk in the world, and the model over the images: tracking/C/{chunk}.npy."""
     input:
         unpack(mono_inputs),
         unpack(mesh_offsets),

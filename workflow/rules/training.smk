@@ -23,7 +23,7 @@ rule train:
     output:
         model=R + "/models/{regressor}.h5",
         curve=R + "/models/{regressor}.cv.tsv",
-        picture=R + "/models/{regressor}.cv.png",
+        image=R + "/models/{regressor}.cv.png",
     log:
         R + "/logs/train/{regressor}.log",
     benchmark:

@@ -18,7 +18,7 @@ from vermilion.appearance.samples import SurfaceSamples
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.storage.arrays import read_arrays, write_arrays
 
-#: Mean linear albedo that skin is taken to have: scales light against albedo, which no picture tells.
+#: Mean linear albedo that skin is taken to have: scales light against albedo, which no image tells.
 SKIN_ALBEDO = 0.35
 _ROUNDS = 4
 #: A colour this far off counts half (display values, 0 to 255).
@@ -97,7 +97,7 @@ def estimate_appearance(
         skin = middle_colour(finest / shading, trust)
         albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
-    # No picture tells a bright light on dark skin from a dim one on fair skin, nor their colours:
+    # No image tells a bright light on dark skin from a dim one on fair skin, nor their colours:
     # the light on the face is white on the whole, the skin as bright as skin is.
     weight = trust / max(trust.sum(), 1e-12)
     mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))

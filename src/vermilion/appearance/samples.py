@@ -1,4 +1,4 @@
-"""Places on the model's skin at which model and picture are compared: the same in every frame."""
+"""Places on the model's skin at which model and image are compared: the same in every frame."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ weights w, the mesh C + sum_k w_k B_k minimises, in each frame for itself,
 
     mean_i (n_i . (p_i - q_i(w)))^2  +  ridge * sum_k (w_k |B_k|)^2
 
-where p_i are contour points found in the picture, n_i the direction across the contour, and q_i the
+where p_i are contour points found in the image, n_i the direction across the contour, and q_i the
 projections of their points on the mesh, in millimetres at the mouth's depth. The outer contour is an
 iso-line of the model. The inner one is an occluding contour: which points of the lips form it depends
 on the shape, so that it is found again in turn with the weights (Anderson et al. 2013).

@@ -1,1 +1,1 @@
-"""Captures as they come: checked pictures and calibrated cameras (Lips16 3.1)."""
+"""Captures as they come: checked images and calibrated cameras (Lips16 3.1)."""

@@ -1,4 +1,4 @@
-"""Calibration boards: ChArUco and checkerboard, and the corners seen in a picture."""
+"""Calibration boards: ChArUco and checkerboard, and the corners seen in an image."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Board:
 
 @dataclass(frozen=True)
 class Corners:
-    """Board corners seen in one picture.
+    """Board corners seen in one image.
 
     Attributes:
         ids: (n,) int.
@@ -62,7 +62,7 @@ class Corners:
 
 
 class BoardDetector:
-    """Finds one board in grey pictures."""
+    """Finds one board in grey images."""
 
     def __init__(self, board: Board):
         self.board = board

@@ -42,7 +42,7 @@ def adjust(
 
     Where `centres_mm` (camera -> (3,)) are given, each centre is drawn to its place: a deviation of
     `shift_mm` costs as much as one of a pixel. A rig round a small face can bend with hardly any
-    change in the pictures; this is what keeps it from doing so. One thread, so that the sums have
+    change in the images; this is what keeps it from doing so. One thread, so that the sums have
     one order. The world is nearly free to drift: see `lay_onto`.
     """
     model = pycolmap.Reconstruction()

@@ -101,7 +101,7 @@ def _check_enough(seen: Observations, sizes: dict[str, tuple[int, int]], place: 
         raise InputError(
             f"the board in too few views ({listing})",
             f"at least {MIN_VIEWS} views a camera",
-            "Add calibration pictures of these cameras, or check the board's squares, sizes and "
+            "Add calibration images of these cameras, or check the board's squares, sizes and "
             "dictionary in the configuration.",
             **place,
         )
@@ -154,7 +154,7 @@ def _join(
                 f"no moment at which {', '.join(lonely)} and {', '.join(sorted(poses))} both see "
                 "the board",
                 "views named equally across cameras, at the same moment",
-                "Add pictures of the board where neighbouring cameras see it together.",
+                "Add images of the board where neighbouring cameras see it together.",
                 **place,
             )
         _, known, name = max(links, key=lambda link: (link[0], link[1], link[2]))

@@ -1,4 +1,4 @@
-"""Does a picture open, decode to its last row, and have the size it should?"""
+"""Does an image open, decode to its last row, and have the size it should?"""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ImageFacts:
     Attributes:
         file: path relative to the capture.
         size_bytes, sha256: of the file.
-        width_px, height_px: of the picture.
+        width_px, height_px: of the image.
         channels: number of channels.
         bits: bits a channel.
     """
@@ -37,7 +37,7 @@ class ImageFacts:
 def check_image(
     path: Path, root: Path, expected_size: tuple[int, int] | None
 ) -> tuple[ImageFacts | None, str]:
-    """Read a picture whole.
+    """Read an image whole.
 
     Args:
         path: the file.
@@ -45,7 +45,7 @@ def check_image(
         expected_size: (width, height), None for any.
 
     Returns:
-        (facts, "") or (facts or None, reason why the picture cannot be used).
+        (facts, "") or (facts or None, reason why the image cannot be used).
     """
     if not path.is_file():
         return None, "missing"

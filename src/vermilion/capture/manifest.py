@@ -1,4 +1,4 @@
-"""The manifest of a chunk: every picture with its size and hash, and what is wrong with it."""
+"""The manifest of a chunk: every image with its size and hash, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Manifest:
 
     Attributes:
         kind: `capture` (folders of frames of named cameras), `frames` (one folder) or `video`.
-        cameras: name -> {width_px, height_px, channels, bits}; the size the pictures should have.
+        cameras: name -> {width_px, height_px, channels, bits}; the size the images should have.
         frames: camera -> frame -> facts of the file (empty for a video).
         bad: camera -> frame -> reason.
         video: facts of the video file, empty otherwise.
@@ -78,9 +78,9 @@ def capture_manifest(
     cameras: Sequence[str] | None = None,
     hash_decoded: bool = False,
 ) -> Manifest:
-    """Check the pictures of a chunk.
+    """Check the images of a chunk.
 
-    A picture that is missing, truncated, unreadable or wrongly sized is listed in `bad` and the
+    An image that is missing, truncated, unreadable or wrongly sized is listed in `bad` and the
     take goes on.
 
     Args:
@@ -90,8 +90,8 @@ def capture_manifest(
         hash_decoded: also hash the decoded frames of a video.
 
     Raises:
-        InputError listing everything that stops the take: a camera of the rig without pictures,
-        or whose pictures all disagree with its calibration.
+        InputError listing everything that stops the take: a camera of the rig without images,
+        or whose images all disagree with its calibration.
     """
     source = Path(source)
     if source.suffix.lower() in VIDEO_SUFFIXES:
@@ -113,7 +113,7 @@ def capture_manifest(
         if not paths:
             problems.append(
                 describe_problem(
-                    "no picture",
+                    "no image",
                     "numbered frames of every camera of the rig",
                     "Add the camera's frames, or take it out of the rig.",
                     camera=camera,
@@ -136,7 +136,7 @@ def _check_camera(
     sizes: dict[str, tuple[int, int]],
     source: Path,
 ) -> list[str]:
-    """Check one camera's pictures of the chunk, filling the manifest; returns fatal problems."""
+    """Check one camera's images of the chunk, filling the manifest; returns fatal problems."""
     expected = sizes.get(camera)
     calibrated = expected is not None
     if not calibrated:
@@ -155,7 +155,7 @@ def _check_camera(
         found = Counter(header_size(path) for path in paths.values()).most_common(1)
         return [
             describe_problem(
-                f"pictures of {_times(found[0][0])}",
+                f"images of {_times(found[0][0])}",
                 f"{width}x{height}, as the calibration says",
                 "Calibrate again at this size, or export the frames at the calibrated size.",
                 subject=manifest.subject,
@@ -247,7 +247,7 @@ def _fatal(problems: list[str], source: Path, place: dict) -> InputError:
     lines = "\n".join(f"  {i}. {problem}" for i, problem in enumerate(problems, start=1))
     return InputError(
         f"{len(problems)} problem(s) that stop the take:\n{lines}\n",
-        "every camera of the rig with pictures that fit its calibration",
+        "every camera of the rig with images that fit its calibration",
         "Mend all of them, then run again.",
         path=source,
         **place,
@@ -259,7 +259,7 @@ def quality_rows(
 ) -> list[QualityRow]:
     """A row a frame: invalid without a `needed` camera or without half of the cameras.
 
-    A frame that lacks some other picture is valid but names it in its reason.
+    A frame that lacks some other image is valid but names it in its reason.
     """
     rows = []
     for frame in frames:

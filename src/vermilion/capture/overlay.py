@@ -1,4 +1,4 @@
-"""Pictures of what the capture stage found: contact sheets, seen against expected corners."""
+"""Images of what the capture stage found: contact sheets, seen against expected corners."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 
 
 def contact_sheet(
-    pictures: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
+    images: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
 ) -> np.ndarray:
-    """One linear picture a camera with its name, (h, w, 3) uint8; None is drawn as missing."""
+    """One linear image a camera with its name, (h, w, 3) uint8; None is drawn as missing."""
     tiles = []
-    for name, linear in pictures.items():
+    for name, linear in images.items():
         if linear is None:
             blank = np.full((height_px, height_px, 3), 40, dtype=np.uint8)
             tiles.append(label(blank, f"{name}: cannot be read"))
@@ -33,25 +33,25 @@ def calibration_sheet(
     """The worst view of each camera with seen (green) and expected (red) corners.
 
     Args:
-        views: camera -> moment -> linear picture; only the moment drawn is read.
+        views: camera -> moment -> linear image; only the moment drawn is read.
     """
     tiles = []
     for name in calibration.cameras:
         residuals = calibration.residuals[name]
         moment = worst_view(calibration, name)
         seen, expected = residuals[moment]
-        picture = to_display(views[name][moment])
-        scale = height_px / picture.shape[0]
-        picture = _fitted(picture, height_px)
-        picture = draw_points(picture, seen * scale, SEEN, 3)
-        picture = draw_points(picture, expected * scale, EXPECTED, 1)
+        image = to_display(views[name][moment])
+        scale = height_px / image.shape[0]
+        image = _fitted(image, height_px)
+        image = draw_points(image, seen * scale, SEEN, 3)
+        image = draw_points(image, expected * scale, EXPECTED, 1)
         rms = calibration.camera_reprojection_px[name]
-        tiles.append(label(picture, f"{name} {moment}  {rms:.3f} px"))
+        tiles.append(label(image, f"{name} {moment}  {rms:.3f} px"))
     return tile(tiles, min(4, len(tiles)))
 
 
 def refinement_sheet(
-    pictures: Mapping[str, np.ndarray | None],
+    images: Mapping[str, np.ndarray | None],
     shown: Mapping[str, tuple],
     moved: Mapping[str, Mapping[str, float]],
     height_px: int = 480,
@@ -59,24 +59,24 @@ def refinement_sheet(
     """Held-out points as seen (green) and as expected by the given (red) and refined cameras (blue).
 
     Args:
-        pictures: camera -> linear picture, or None.
+        images: camera -> linear image, or None.
         shown, moved: of a `Refinement`.
     """
     tiles = []
-    for name, linear in pictures.items():
+    for name, linear in images.items():
         if linear is None or name not in shown:
             continue
         scale = height_px / linear.shape[0]
-        picture = _fitted(to_display(linear), height_px)
+        image = _fitted(to_display(linear), height_px)
         seen, given, refined = shown[name]
-        picture = draw_points(picture, given * scale, EXPECTED, 2)
-        picture = draw_points(picture, seen * scale, SEEN, 2)
+        image = draw_points(image, given * scale, EXPECTED, 2)
+        image = draw_points(image, seen * scale, SEEN, 2)
         if refined is not None:
-            picture = draw_points(picture, refined * scale, REFINED, 1)
+            image = draw_points(image, refined * scale, REFINED, 1)
         text = name
         if name in moved:
             text += f"  {moved[name]['turned_deg']:.2f} deg {moved[name]['moved_mm']:.2f} mm"
-        tiles.append(label(picture, text))
+        tiles.append(label(image, text))
     return tile(tiles, min(5, len(tiles)))
 
 
@@ -86,6 +86,6 @@ def worst_view(calibration: Calibration, camera: str) -> str:
     return max(residuals, key=lambda m: float(np.abs(residuals[m][0] - residuals[m][1]).max()))
 
 
-def _fitted(picture: np.ndarray, height_px: int) -> np.ndarray:
-    width = max(1, round(picture.shape[1] * height_px / picture.shape[0]))
-    return cv2.resize(picture, (width, height_px), interpolation=cv2.INTER_AREA)
+def _fitted(image: np.ndarray, height_px: int) -> np.ndarray:
+    width = max(1, round(image.shape[1] * height_px / image.shape[0]))
+    return cv2.resize(image, (width, height_px), interpolation=cv2.INTER_AREA)

@@ -1,8 +1,8 @@
 """Observations of a track to a small part of a pixel: least-squares matching of surface patches.
 
-A feature detector places a point in each picture by itself, a quarter of a pixel off. Here the patch
-round a point in one picture is laid on the tangent plane of the surface, projected into each other
-picture of the track, and shifted there until the pictures agree (Gruen 1985).
+A feature detector places a point in each image by itself, a quarter of a pixel off. Here the patch
+round a point in one image is laid on the tangent plane of the surface, projected into each other
+image of the track, and shifted there until the images agree (Gruen 1985).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def align_patches(
     Args:
         cameras: good to some pixels.
         points_mm: (P, 3) of the tracks.
-        greys: the pictures.
+        greys: the images.
         radius_px: half the width of a patch.
         neighbours: points that settle a tangent plane.
         max_shift_px: observations whose patch lies farther from its point are dropped;
@@ -92,7 +92,7 @@ def _normals(tracks: Tracks, points_mm: np.ndarray, neighbours: int) -> np.ndarr
 
 
 def _laid_over(source, target, grey, pixels, points_mm, normals, radius_px):
-    """Patches of a picture over tangent planes: ((N, S, 2) target pixels, (N, S) values)."""
+    """Patches of an image over tangent planes: ((N, S, 2) target pixels, (N, S) values)."""
     step = np.arange(-radius_px, radius_px + 1)
     grid = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
     at = pixels[:, None] + grid
@@ -108,7 +108,7 @@ def _laid_over(source, target, grey, pixels, points_mm, normals, radius_px):
 
 
 def _shifts(grey, where, patch, rounds, max_shift_px):
-    """Shift (N, 2) px that makes a picture agree with patches up to gain and offset; agreement."""
+    """Shift (N, 2) px that makes an image agree with patches up to gain and offset; agreement."""
     y_slope, x_slope = np.gradient(grey.astype(np.float32))
     wanted = _standardised(patch)[0]
     shift = np.zeros((len(where), 2))

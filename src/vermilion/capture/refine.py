@@ -1,4 +1,4 @@
-"""Refinement of a rig whose calibration is off, from the pictures of the take themselves.
+"""Refinement of a rig whose calibration is off, from the images of the take themselves.
 
 Features are matched near the epipolar lines of the given poses, the poses adjusted over their
 tracks, and the matching repeated with the better poses. Patches of the surface round the points,
@@ -26,7 +26,7 @@ from vermilion.capture.tracks import (
 )
 from vermilion.geometry.camera import Camera
 
-Pictures = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its features
+MultiviewImages = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its features
 
 
 @dataclass(frozen=True)
@@ -105,12 +105,12 @@ class Refinement:
 
 def refine_cameras(
     given: Mapping[str, Camera],
-    pictures: Pictures,
+    images: MultiviewImages,
     matching: MatchSettings,
     settings: RefineSettings,
     only_if_off: bool = True,
 ) -> Refinement:
-    """Adjust the poses of a rig to what its pictures show.
+    """Adjust the poses of a rig to what its images show.
 
     The world stays: the refined rig is turned, shifted and scaled onto the given poses.
 
@@ -122,7 +122,7 @@ def refine_cameras(
     good already, or where the refined ones do not lower the error on held-out tracks clearly.
     """
     given = dict(given)
-    found = _match(given, pictures, matching)
+    found = _match(given, images, matching)
     if found.count < settings.min_tracks:
         reason = f"{found.count} tracks; at least {settings.min_tracks} are needed"
         return Refinement(given, False, reason, {"found": found.count})
@@ -138,9 +138,9 @@ def refine_cameras(
         return Refinement(given, False, reason, tracks, before, None, shown=shown)
     rough, _ = _solve(given, fitted, given, settings)
     near = replace(matching, gate_deg=settings.fine_gate_deg)
-    again = _match(rough, _without(pictures, held), near)
+    again = _match(rough, _without(images, held), near)
     cameras, used = _solve(rough, again, given, settings) if again.count else (rough, fitted)
-    greys = _greys(pictures) if settings.patch_radius_px else None
+    greys = _greys(images) if settings.patch_radius_px else None
     if greys is not None:
         cameras, used = _solve_patches(cameras, used, given, greys, settings)
     enough = sorted(_linked(used, settings.min_camera_tracks))
@@ -174,9 +174,9 @@ def refine_cameras(
     return Refinement(cameras, True, change, tracks, before, after, moved, shown)
 
 
-def _match(cameras: dict[str, Camera], pictures: Pictures, matching: MatchSettings) -> Tracks:
-    frames = sorted(pictures)
-    return join_tracks([match_frame(cameras, pictures[f], matching, f) for f in frames])
+def _match(cameras: dict[str, Camera], images: MultiviewImages, matching: MatchSettings) -> Tracks:
+    frames = sorted(images)
+    return join_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
 
 
 def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
@@ -184,10 +184,10 @@ def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
     return tracks.kept(held[tracks.track]), tracks.kept(~held[tracks.track])
 
 
-def _without(pictures: Pictures, tracks: Tracks) -> Pictures:
+def _without(images: MultiviewImages, tracks: Tracks) -> MultiviewImages:
     """The features that are in none of these tracks."""
     rest = {}
-    for frame, views in pictures.items():
+    for frame, views in images.items():
         rest[frame] = {}
         for i, name in enumerate(tracks.cameras):
             if name not in views:
@@ -229,11 +229,11 @@ def _solve(
     return cameras, tracks
 
 
-def _greys(pictures: Pictures) -> Greys | None:
-    """The pictures of all features; None where one is not known."""
+def _greys(images: MultiviewImages) -> Greys | None:
+    """The images of all features; None where one is not known."""
     greys = {
         frame: {name: features.grey for name, features in views.items()}
-        for frame, views in pictures.items()
+        for frame, views in images.items()
     }
     known = all(grey is not None for views in greys.values() for grey in views.values())
     return greys if known else None

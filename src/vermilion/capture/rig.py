@@ -57,7 +57,7 @@ def image_sizes(manifests: Sequence[Manifest]) -> dict[str, tuple[int, int]]:
     mixed = {name: sorted(found) for name, found in sizes.items() if len(found) > 1}
     if mixed:
         raise InputError(
-            f"pictures of several sizes ({mixed})",
+            f"images of several sizes ({mixed})",
             "one size a camera",
             "Export the take again at one size.",
             subject=manifests[0].subject,
@@ -81,11 +81,11 @@ def rig_cameras(
 
     Args:
         source: capture folder, frame folder or video.
-        sizes: camera -> (width, height) of its pictures.
+        sizes: camera -> (width, height) of its images.
         reference: camera whose frame becomes the world of a calibrated rig.
         assumed_focal: focal length of a single uncalibrated camera, in image widths.
 
-    Raises InputError where several cameras have neither, or the given ones do not fit the pictures.
+    Raises InputError where several cameras have neither, or the given ones do not fit the images.
     """
     source = Path(source)
     if (source / "cameras").is_dir():
@@ -106,14 +106,14 @@ def rig_cameras(
     raise InputError(
         f"{len(sizes)} cameras without a calibration",
         "cameras/ (a COLMAP text model) or calibration/<camera>/ (views of a board)",
-        "Export the rig as COLMAP text, or add ChArUco or checkerboard pictures.",
+        "Export the rig as COLMAP text, or add ChArUco or checkerboard images.",
         path=source,
         **place,
     )
 
 
 def calibration_views(folder: Path, camera: str) -> dict[str, Path]:
-    """Moment -> picture of the board, in order of name."""
+    """Moment -> image of the board, in order of name."""
     views = folder / camera
     paths = sorted(views.iterdir()) if views.is_dir() else []
     return {path.stem: path for path in paths if path.suffix.lower() in IMAGE_SUFFIXES}
@@ -122,9 +122,9 @@ def calibration_views(folder: Path, camera: str) -> dict[str, Path]:
 def detect_boards(
     folder: Path, board: Board, sizes: dict[str, tuple[int, int]], place: dict
 ) -> dict[str, dict[str, Corners]]:
-    """Corners in every calibration picture of every camera, camera -> moment -> corners.
+    """Corners in every calibration image of every camera, camera -> moment -> corners.
 
-    Raises InputError listing all pictures that do not have their camera's size.
+    Raises InputError listing all images that do not have their camera's size.
     """
     detector, seen, problems = BoardDetector(board), {}, []
     for name, size in sizes.items():
@@ -135,7 +135,7 @@ def detect_boards(
             if found != tuple(size):
                 problems.append(
                     describe_problem(
-                        f"a calibration picture of {found[0]}x{found[1]}",
+                        f"a calibration image of {found[0]}x{found[1]}",
                         f"{size[0]}x{size[1]}, as the camera's frames",
                         "Calibrate at the size of the frames.",
                         camera=name,
@@ -148,7 +148,7 @@ def detect_boards(
     if problems:
         raise InputError(
             f"{len(problems)} problem(s):\n  " + "\n  ".join(problems) + "\n",
-            "calibration pictures that fit",
+            "calibration images that fit",
             "Mend all of them, then run again.",
             path=folder,
             **place,
@@ -166,13 +166,13 @@ def _check_given(
         elif (cameras[name].width_px, cameras[name].height_px) != (width, height):
             given = cameras[name]
             problems.append(
-                f"camera {name} is calibrated at {given.width_px}x{given.height_px}, its pictures "
+                f"camera {name} is calibrated at {given.width_px}x{given.height_px}, its images "
                 f"are {width}x{height}"
             )
     if problems:
         raise InputError(
             "; ".join(problems),
-            "a calibration of every camera at the size of its pictures",
+            "a calibration of every camera at the size of its images",
             "Correct cameras/, or export the frames at the calibrated size.",
             path=source / "cameras",
             **place,

@@ -17,12 +17,12 @@ from vermilion.imaging.draw import to_display
 
 @dataclass(frozen=True)
 class Features:
-    """Salient points of a picture.
+    """Salient points of an image.
 
     Attributes:
         points_px: (N, 2).
         descriptors: (N, 128) float32 of unit length.
-        grey: (h, w) uint8, the picture itself; None where it is not known.
+        grey: (h, w) uint8, the image itself; None where it is not known.
     """
 
     points_px: np.ndarray
@@ -70,7 +70,7 @@ class MatchSettings:
 
     Attributes:
         contrast: smallest contrast of a feature, in [0, 1].
-        max_features: of one picture.
+        max_features: of one image.
         gate_deg: how far a match may lie from the epipolar plane of the given poses.
         max_angle_deg: pairs of cameras whose axes differ by more are not matched.
         ratio: distance of the best descriptor within the gate over that of the second best.
@@ -90,7 +90,7 @@ class MatchSettings:
 
 
 def find_features(linear_rgb: np.ndarray, contrast: float, max_features: int) -> Features:
-    """SIFT features of a linear picture (h, w, 3)."""
+    """SIFT features of a linear image (h, w, 3)."""
     grey = np.rint(to_display(linear_rgb) @ [0.299, 0.587, 0.114]).astype(np.uint8)
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False

@@ -10,7 +10,7 @@ from vermilion.config.base import StageConfig
 
 
 class ManifestConfig(StageConfig):
-    """What is recorded of the pictures."""
+    """What is recorded of the images."""
 
     hash_decoded: bool = Field(
         False,
@@ -19,7 +19,7 @@ class ManifestConfig(StageConfig):
 
 
 class CalibrationConfig(StageConfig):
-    """Calibration from pictures of a board, for captures without `cameras/`."""
+    """Calibration from images of a board, for captures without `cameras/`."""
 
     board: Literal["charuco", "checkerboard"] = Field(
         "charuco", description="Kind of the calibration board."
@@ -45,7 +45,7 @@ class CalibrationConfig(StageConfig):
         "distortion terms.",
     )
     refine_principal_point: bool = Field(
-        True, description="Estimate the principal point; otherwise it is the middle of the picture."
+        True, description="Estimate the principal point; otherwise it is the middle of the image."
     )
     max_view_px: float = Field(
         2.0, gt=0, le=50, description="Board views with a larger RMS error are left out (pixels)."
@@ -106,7 +106,7 @@ class RefinementConfig(StageConfig):
         0.002, gt=0, lt=0.1, description="Smallest contrast of a feature (of the range of grey)."
     )
     max_features: int = Field(
-        6000, ge=100, le=50000, description="Features of one picture at most (count)."
+        6000, ge=100, le=50000, description="Features of one image at most (count)."
     )
     gate_deg: float = Field(
         1.0,
@@ -208,10 +208,10 @@ class CaptureConfig(StageConfig):
         "rig calibrated here is its frame.",
     )
     manifest: ManifestConfig = Field(
-        default_factory=ManifestConfig, description="What is recorded of the pictures."
+        default_factory=ManifestConfig, description="What is recorded of the images."
     )
     calibration: CalibrationConfig = Field(
-        default_factory=CalibrationConfig, description="Calibration from pictures of a board."
+        default_factory=CalibrationConfig, description="Calibration from images of a board."
     )
     refinement: RefinementConfig = Field(
         default_factory=RefinementConfig, description="Refinement of the cameras' poses."

@@ -163,7 +163,7 @@ class ContourMapsConfig(StageConfig):
         description="A frame whose outer map stays below this likelihood is flagged.",
     )
     overlay_frames: int = Field(
-        12, ge=1, le=200, description="Frames at most in a chunk's overlay picture."
+        12, ge=1, le=200, description="Frames at most in a chunk's overlay image."
     )
 
 

@@ -69,13 +69,13 @@ class IntegrationConfig(StageConfig):
         }
 
 
-class PictureConfig(StageConfig):
-    """How the corrected mesh is made to agree with the picture. None of it is in the paper."""
+class ImageAgreementConfig(StageConfig):
+    """How the corrected mesh is made to agree with the image. None of it is in the paper."""
 
     repose: bool = Field(
         True,
-        description="Lay the corrected head on the picture again: rigidly, by its lip contours, brows "
-        "and eyes. Without, true lips beside a coarse face of other proportions miss the picture's.",
+        description="Lay the corrected head on the image again: rigidly, by its lip contours, brows "
+        "and eyes. Without, true lips beside a coarse face of other proportions miss the image's.",
     )
     repose_frames: float = Field(
         3.0,
@@ -89,7 +89,7 @@ class PictureConfig(StageConfig):
         ge=0.0,
         le=1000.0,
         description="Weight of a millimetre of lip contour, as a constraint that it projects on the one "
-        "found in the picture, beside the stiffness of the mesh. 0: none.",
+        "found in the image, beside the stiffness of the mesh. 0: none.",
     )
     contour_robust_mm: float = Field(
         2.5,
@@ -101,12 +101,12 @@ class PictureConfig(StageConfig):
         0.012,
         ge=0.0,
         le=0.2,
-        description="The lips touch where the inner contour in the picture is lower than this, per "
+        description="The lips touch where the inner contour in the image is lower than this, per "
         "distance between the outer corners of the eyes (about 1 mm).",
     )
     contact: bool = Field(
         True,
-        description="Lips that touch in the picture meet in the mesh (by `contour_weight`), and never pass "
+        description="Lips that touch in the image meet in the mesh (by `contour_weight`), and never pass "
         "through each other.",
     )
 
@@ -123,8 +123,8 @@ class CorrectionConfig(StageConfig):
     integration: IntegrationConfig = Field(
         default_factory=IntegrationConfig, description="Applying layers."
     )
-    picture: PictureConfig = Field(
-        default_factory=PictureConfig, description="Agreeing with the picture."
+    image: ImageAgreementConfig = Field(
+        default_factory=ImageAgreementConfig, description="Agreeing with the image."
     )
     neutral_frames: dict[str, int] = Field(
         default_factory=dict,
@@ -134,4 +134,4 @@ class CorrectionConfig(StageConfig):
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""
-        return self.picture.reach_frames + self.integration.at(fps)["smooth_frames"]
+        return self.image.reach_frames + self.integration.at(fps)["smooth_frames"]

@@ -12,10 +12,10 @@ from vermilion.config.base import StageConfig
 class CorrespondenceConfig(StageConfig):
     """Laplacian registration of the two neutrals, once a subject (Lips16 4.1)."""
 
-    landmarks: Literal["picture", "model"] = Field(
-        "picture",
-        description="What ties the two neutrals together first. `picture`: the landmarks of the "
-        "frontal picture, carried onto both meshes along their rays (the paper's way). `model`: the "
+    landmarks: Literal["image", "model"] = Field(
+        "image",
+        description="What ties the two neutrals together first. `image`: the landmarks of the "
+        "frontal image, carried onto both meshes along their rays (the paper's way). `model`: the "
         "landmark vertices of the template and of the tracker's model.",
     )
     landmark_weight: float = Field(

@@ -123,7 +123,7 @@ class ShadingConfig(StageConfig):
     )
     map_px: int = Field(1024, ge=16, le=8192, description="Side of the normal maps (pixels).")
     overlay_frames: int = Field(
-        2, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+        2, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )
 
     @field_validator("window")
@@ -157,5 +157,5 @@ class DetailConfig(StageConfig):
         default_factory=ShadingConfig, description="Fine relief from shading (Mono13 8)."
     )
     overlay_frames: int = Field(
-        4, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+        4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

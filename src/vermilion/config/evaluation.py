@@ -90,7 +90,7 @@ class ContourConfig(StageConfig):
 
 
 class FiguresConfig(StageConfig):
-    """Pictures of the report."""
+    """Images of the report."""
 
     error_scale_mm: float = Field(
         5.0, gt=0.0, le=50.0, description="Error shown in the hottest colour of error maps (mm)."
@@ -141,5 +141,5 @@ class EvaluationConfig(StageConfig):
         default_factory=MeasuresConfig, description="Figures and their intervals."
     )
     figures: FiguresConfig = Field(
-        default_factory=FiguresConfig, description="Pictures of the report."
+        default_factory=FiguresConfig, description="Images of the report."
     )

@@ -29,7 +29,7 @@ class ContourFeaturesConfig(StageConfig):
     space: Literal["head", "image"] = Field(
         "head",
         description="`head`: contours are put back on the tracked lips and measured in 3D, so that a "
-        "turn of the head is undone (Lips16 7). `image`: measured in the picture (Lips16 5.1).",
+        "turn of the head is undone (Lips16 7). `image`: measured in the image (Lips16 5.1).",
     )
     samples: int = Field(
         80, ge=20, le=400, description="Samples on each contour (a multiple of 20)."
@@ -63,7 +63,7 @@ class ContourFeaturesConfig(StageConfig):
         description="A frame with a smaller share of its outer contour found is flagged.",
     )
     overlay_frames: int = Field(
-        15, ge=1, le=200, description="Frames at most in a chunk's overlay picture."
+        15, ge=1, le=200, description="Frames at most in a chunk's overlay image."
     )
 
     @field_validator("samples")

@@ -98,7 +98,7 @@ class ShadingConfig(StageConfig):
 
 
 class OpeningConfig(StageConfig):
-    """Where the mouth opens: the contours of the mesh, corrected by what the picture shows."""
+    """Where the mouth opens: the contours of the mesh, corrected by what the image shows."""
 
     reach_mm: float = Field(
         2.5,
@@ -159,9 +159,7 @@ class CompositeConfig(StageConfig):
         description="Pixels of the mouth opening this close to the lips are freed of the tattoo that "
         "the lens mixed into them (pixels).",
     )
-    grain: bool = Field(
-        True, description="Add the noise that the picture has and the texture lacks."
-    )
+    grain: bool = Field(True, description="Add the noise that the image has and the texture lacks.")
     seed: int = Field(0, ge=0, description="Seed of that noise.")
 
 

@@ -64,7 +64,7 @@ class LandmarkTrainingConfig(StageConfig):
         0.1, gt=0, le=100, description="Ridge parameter, relative to the features' mean variance."
     )
     perturbations: int = Field(
-        6, ge=1, le=50, description="Starting shapes a training picture and its mirror (count)."
+        6, ge=1, le=50, description="Starting shapes a training image and its mirror (count)."
     )
     box_shift: float = Field(
         0.08, ge=0, le=0.3, description="Deviation of the start's place (face sizes)."
@@ -73,13 +73,13 @@ class LandmarkTrainingConfig(StageConfig):
         0.1, ge=0, le=0.3, description="Deviation of the logarithm of the start's size."
     )
     box_turn_deg: float = Field(
-        8.0, ge=0, le=30, description="Deviation of the start's turn in the picture (degrees)."
+        8.0, ge=0, le=30, description="Deviation of the start's turn in the image (degrees)."
     )
     max_frames: int = Field(
         400,
         ge=10,
         le=5000,
-        description="Labelled pictures that are used, evenly spread over all (count).",
+        description="Labelled images that are used, evenly spread over all (count).",
     )
     found_threshold: float = Field(
         0.35, ge=0.0, le=1.0, description="Least mean confidence of a face's landmarks (0 to 1)."

@@ -112,7 +112,7 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
         if configuration.landmarks.detector == "csv" and not scan.landmarks:
             problems.append(
                 f"{key}.landmarks: found nothing; expected a file, as landmarks.detector is `csv` and "
-                "nothing looks for landmarks in pictures."
+                "nothing looks for landmarks in images."
             )
     for name in configuration.apply.takes:
         if name not in by_name:

@@ -8,7 +8,7 @@ from vermilion.config.base import StageConfig
 
 
 class ImageConfig(StageConfig):
-    """How pictures are prepared for matching."""
+    """How images are prepared for matching."""
 
     window_px: float = Field(
         8.0,
@@ -20,7 +20,7 @@ class ImageConfig(StageConfig):
         0.01,
         gt=0,
         le=0.5,
-        description="Local deviation of sRGB luma (0 to 1) below which a picture counts as flat.",
+        description="Local deviation of sRGB luma (0 to 1) below which an image counts as flat.",
     )
 
 
@@ -51,7 +51,7 @@ class StereoConfig(StageConfig):
         4.0,
         ge=0,
         le=100,
-        description="Smallest local deviation of the normalised picture (grey levels of 255).",
+        description="Smallest local deviation of the normalised image (grey levels of 255).",
     )
     spacing_mm: float = Field(
         1.0, gt=0.1, le=5, description="Spacing of the fused point cloud (mm)."
@@ -117,7 +117,7 @@ class NeutralConfig(StageConfig):
     same_points: bool = Field(
         True,
         description="Later takes of a person carry the same points of the skin as the first: the first "
-        "one's neutral is registered to theirs by the pictures. Off: each take for itself.",
+        "one's neutral is registered to theirs by the images. Off: each take for itself.",
     )
 
 
@@ -125,7 +125,7 @@ class TrackConfig(StageConfig):
     """The coarse track through the take, between anchor frames."""
 
     scale: float = Field(
-        0.5, gt=0.05, le=1.0, description="Size of the pictures against the originals (ratio)."
+        0.5, gt=0.05, le=1.0, description="Size of the images against the originals (ratio)."
     )
     length_mm: float = Field(
         3.0, gt=0.5, le=50, description="Stiffness: motion is smooth below this length (mm)."
@@ -134,7 +134,7 @@ class TrackConfig(StageConfig):
         0.5,
         gt=0.01,
         le=10,
-        description="Expected error of a flow vector (px of the small pictures).",
+        description="Expected error of a flow vector (px of the small images).",
     )
     min_agreement: float = Field(
         0.4, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
@@ -146,7 +146,7 @@ class TrackConfig(StageConfig):
         0.6,
         ge=0,
         le=1,
-        description="Smallest correlation of an anchor frame's pictures with the neutral's.",
+        description="Smallest correlation of an anchor frame's images with the neutral's.",
     )
     clip_frames: int = Field(
         24,
@@ -157,12 +157,12 @@ class TrackConfig(StageConfig):
 
 
 class RefineConfig(StageConfig):
-    """The final registration of each frame to the neutral's pictures."""
+    """The final registration of each frame to the neutral's images."""
 
     scales: list[float] = Field(
         [0.5, 1.0],
         min_length=1,
-        description="Size of the pictures in each round against the originals (ratio).",
+        description="Size of the images in each round against the originals (ratio).",
     )
     lengths_mm: list[float] = Field(
         [2.5, 1.0],
@@ -179,13 +179,13 @@ class RefineConfig(StageConfig):
         8.0, gt=0.1, le=100, description="Longest motion of a vertex in a round (mm)."
     )
     ray_stride_px: int = Field(
-        2, ge=1, le=8, description="Distance of the rays that predict a picture (px)."
+        2, ge=1, le=8, description="Distance of the rays that predict an image (px)."
     )
     cloud_scale: float = Field(
         0.5,
         ge=0,
         le=1.0,
-        description="Size of the pictures for each frame's stereo points against the originals "
+        description="Size of the images for each frame's stereo points against the originals "
         "(ratio); 0: no stereo after the neutral.",
     )
     cloud_gate_mm: float = Field(
@@ -207,19 +207,19 @@ class RefineConfig(StageConfig):
 
 
 class DriftConfig(StageConfig):
-    """Drift against the anchor: the neutral's pictures carried to each frame by its mesh."""
+    """Drift against the anchor: the neutral's images carried to each frame by its mesh."""
 
     scale: float = Field(
         0.5,
         gt=0.05,
         le=1.0,
-        description="Size of the compared pictures against the originals (ratio).",
+        description="Size of the compared images against the originals (ratio).",
     )
     min_agreement: float = Field(
         0.3, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
     )
     ray_stride_px: int = Field(
-        2, ge=1, le=8, description="Distance of the rays that carry a picture (px)."
+        2, ge=1, le=8, description="Distance of the rays that carry an image (px)."
     )
 
 
@@ -235,8 +235,8 @@ class ReportConfig(StageConfig):
     flagged_frames: int = Field(
         2, ge=0, le=50, description="Flagged frames shown, those of the largest drift first."
     )
-    picture_px: int = Field(
-        200, ge=80, le=800, description="Width and height of a picture of a sheet (px)."
+    image_px: int = Field(
+        200, ge=80, le=800, description="Width and height of an image of a sheet (px)."
     )
     residual_px: float = Field(
         1.0, gt=0, le=20, description="Residual of the hottest colour (px of the originals)."
@@ -258,7 +258,7 @@ class ReportConfig(StageConfig):
 class MultiviewConfig(StageConfig):
     """From calibrated cameras to **H**, the registered high-quality mesh sequence."""
 
-    images: ImageConfig = Field(default_factory=ImageConfig, description="Preparation of pictures.")
+    images: ImageConfig = Field(default_factory=ImageConfig, description="Preparation of images.")
     stereo: StereoConfig = Field(default_factory=StereoConfig, description="Dense matching.")
     neutral: NeutralConfig = Field(
         default_factory=NeutralConfig, description="Template to the neutral frame."

@@ -19,13 +19,13 @@ class AppearanceConfig(StageConfig):
         5, ge=0, le=20, description="Turns of appearance and of the chosen frames' pose (count)."
     )
     spacing_mm: float = Field(
-        2.2, ge=0.5, le=20, description="Between places where model and picture are compared (mm)."
+        2.2, ge=0.5, le=20, description="Between places where model and image are compared (mm)."
     )
     pixel_mm: float = Field(
         0.5,
         ge=0.1,
         le=20,
-        description="Pixel of the finest picture that is compared (mm at the face).",
+        description="Pixel of the finest image that is compared (mm at the face).",
     )
     albedo_prior: float = Field(
         0.5,
@@ -36,7 +36,7 @@ class AppearanceConfig(StageConfig):
 
 
 class PhotometricConfig(StageConfig):
-    """Pose and expression from the pictures: how much they count beside the landmarks."""
+    """Pose and expression from the images: how much they count beside the landmarks."""
 
     sigma: float = Field(
         6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
@@ -82,12 +82,12 @@ class JoinConfig(StageConfig):
         gt=0,
         le=1e9,
         description="Typical acceleration of a head (mm per second squared); smaller is smoother, of its "
-        "depth above all, which pictures tell least of.",
+        "depth above all, which images tell least of.",
     )
 
 
 class LayerConfig(StageConfig):
-    """The corrective layer outside the model's space: offsets parallel to the picture."""
+    """The corrective layer outside the model's space: offsets parallel to the image."""
 
     sigma_mm: float = Field(2.0, gt=0, le=100, description="Deviation of an offset (mm).")
     length_mm: float = Field(
@@ -108,7 +108,7 @@ class LayerConfig(StageConfig):
 
 
 class RefinementConfig(StageConfig):
-    """Dense refinement of the track by its pictures: analysis by synthesis (Lips16 3.2)."""
+    """Dense refinement of the track by its images: analysis by synthesis (Lips16 3.2)."""
 
     photometric: bool = Field(
         True, description="Refine pose and expression; off: the landmark fit is the track."
@@ -120,12 +120,12 @@ class RefinementConfig(StageConfig):
         default_factory=AppearanceConfig, description="Lighting and albedo."
     )
     fit: PhotometricConfig = Field(
-        default_factory=PhotometricConfig, description="Pose and expression from the pictures."
+        default_factory=PhotometricConfig, description="Pose and expression from the images."
     )
     join: JoinConfig = Field(
         default_factory=JoinConfig, description="The refined frames as one track."
     )
     offsets: LayerConfig = Field(default_factory=LayerConfig, description="The corrective layer.")
     overlay_frames: int = Field(
-        4, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+        4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

@@ -64,7 +64,7 @@ class Configuration(StageConfig):
     )
     refinement: RefinementConfig = Field(
         default_factory=RefinementConfig,
-        description="Dense refinement of the track by its pictures (Lips16 3.2).",
+        description="Dense refinement of the track by its images (Lips16 3.2).",
     )
     detail: DetailConfig = Field(
         default_factory=DetailConfig, description="A finer sequence than C (Mono13 7)."

@@ -79,13 +79,13 @@ class StudioConfig(StageConfig):
         description="Deviation of drawn identity coefficients (standard deviations).",
     )
     face_size_px: tuple[int, int] = Field(
-        (512, 512), description="Width and height of the six face cameras' pictures (px)."
+        (512, 512), description="Width and height of the six face cameras' images (px)."
     )
     lip_size_px: tuple[int, int] = Field(
-        (512, 512), description="Width and height of the four lip cameras' pictures (px)."
+        (512, 512), description="Width and height of the four lip cameras' images (px)."
     )
     video_size_px: tuple[int, int] = Field(
-        (640, 480), description="Width and height of `video` takes' pictures (px)."
+        (640, 480), description="Width and height of `video` takes' images (px)."
     )
     face_view_mm: float = Field(
         245.0, gt=50, le=1000, description="Height that a face camera sees at the face (mm)."

@@ -50,17 +50,17 @@ class ModelFitConfig(StageConfig):
     )
 
 
-class PictureIdentityConfig(StageConfig):
-    """The person from the pictures as well: shape, albedo and light together (Lips16 3.2)."""
+class IdentityImagesConfig(StageConfig):
+    """The person from the images as well: shape, albedo and light together (Lips16 3.2)."""
 
     enabled: bool = Field(
-        True, description="Fit the person to the pictures of these frames; off: to landmarks alone."
+        True, description="Fit the person to the images of these frames; off: to landmarks alone."
     )
     spacing_mm: float = Field(
-        5.0, ge=0.5, le=20, description="Between places where model and picture are compared (mm)."
+        5.0, ge=0.5, le=20, description="Between places where model and image are compared (mm)."
     )
     pixel_mm: float = Field(
-        8.0, ge=0.1, le=20, description="Pixel of the picture that is compared (mm at the face)."
+        8.0, ge=0.1, le=20, description="Pixel of the image that is compared (mm at the face)."
     )
     sigma: float = Field(
         6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
@@ -107,8 +107,8 @@ class IdentityConfig(StageConfig):
         le=2,
         description="Deviation of the logarithm of an unknown focal length about the assumed one.",
     )
-    pictures: PictureIdentityConfig = Field(
-        default_factory=PictureIdentityConfig, description="The person from the pictures as well."
+    images: IdentityImagesConfig = Field(
+        default_factory=IdentityImagesConfig, description="The person from the images as well."
     )
 
 
@@ -149,7 +149,7 @@ class MeshesConfig(StageConfig):
     """The mesh sequence and its overlays."""
 
     overlay_frames: int = Field(
-        6, ge=1, le=100, description="Frames of a chunk in its overlay picture (count)."
+        6, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )
 
 

@@ -22,7 +22,7 @@ FORMAT_VERSION = 1
 
 
 class ContourDetector(ABC):
-    """Finds lip contours in each picture by itself, so that chunks do not matter.
+    """Finds lip contours in each image by itself, so that chunks do not matter.
 
     Attributes:
         interocular_size_px: inter-ocular distance of the region that is looked at.
@@ -62,7 +62,7 @@ class ContourDetector(ABC):
         return inner, outer
 
     @abstractmethod
-    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+    def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
 
 
@@ -84,9 +84,9 @@ class BoostedDetector(ContourDetector):
     margin: float
     smoothing_px: float = 1.0
 
-    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+    def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
-        integrals = integral_images(image_channels(picture))
+        integrals = integral_images(image_channels(image))
         rows, columns = np.nonzero(region.mask)
         maps = {}
         for name, forest in self.forests.items():

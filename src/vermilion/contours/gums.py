@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 RED = 0.7  # per the lips': redness per lightness of flesh, whatever light falls on it
-LEAST_RED = 0.05  # in a picture without colour nothing is told from teeth
+LEAST_RED = 0.05  # in an image without colour nothing is told from teeth
 BLACK = 0.25  # per the lips' lightness: darker is the mouth's opening itself
 BLURRED_PX = 2.0  # flesh beside something else is mixed with it
 DEPTH = (0.1, 0.3)  # of no and of a sure crease: logarithm of lightness against both sides
@@ -19,7 +19,7 @@ LINE_PX = 2.0  # deviation of a crease's place
 
 
 def flesh_plane(colours: np.ndarray, lip: np.ndarray) -> np.ndarray:
-    """Where the picture is flesh in light or shade, not teeth, skin or black, (size, size) float32.
+    """Where the image is flesh in light or shade, not teeth, skin or black, (size, size) float32.
 
     Args:
         colours: (3, size, size) as `channels.COLOUR_CHANNELS`.

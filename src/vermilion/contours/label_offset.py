@@ -1,4 +1,4 @@
-"""Whether the outer contours that a person drew lie on the border that the pictures show.
+"""Whether the outer contours that a person drew lie on the border that the images show.
 
 A hand draws to about a pixel, and leans the same way in all frames of a take: just inside the lips,
 or round all that is a little red. A detector learns the lean with the rest. The border of the lips'
@@ -28,7 +28,7 @@ def outer_offset(
     """How far a drawn outer contour lies outside the border of the lips' colour, on the mean.
 
     Args:
-        frame: the picture with what was drawn on it.
+        frame: the image with what was drawn on it.
         detector: the take's.
         lips_px: outer and inner ring (n, 2) of the tracked lips.
 
@@ -57,7 +57,7 @@ def without_lean(
     tolerance: float,
     reach: float,
 ) -> tuple[list[LabelledFrame], list[QualityRow]]:
-    """Labels on the border that the pictures show, and what is to be said of each.
+    """Labels on the border that the images show, and what is to be said of each.
 
     Where the median over the frames of `outer_offset` exceeds the tolerance, all outer contours are
     moved by it: what they say of each frame and each place stays. Beyond the reach they are not: the

@@ -104,7 +104,7 @@ def dark_valley(
     reach_px: float,
     least_contrast: float = 0.015,
 ) -> np.ndarray:
-    """The darkest smooth line between two points of a picture (h, w), (n, 2) pixels.
+    """The darkest smooth line between two points of an image (h, w), (n, 2) pixels.
 
     It leaves the straight line by at most `reach_px`, and starts at `start`: lips in contact show
     a dark line from the mouth's opening towards its corner. It ends where it is no darker than

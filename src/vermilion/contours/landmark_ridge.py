@@ -1,4 +1,4 @@
-"""Likelihood maps where nobody labelled contours: from the landmarks' lip loops and the picture.
+"""Likelihood maps where nobody labelled contours: from the landmarks' lip loops and the image.
 
 The spline through each loop is moved to the border of the lips' colour. What is lip-coloured is
 learnt in each frame by itself, from the band between the loops; then again between the borders that
@@ -23,9 +23,9 @@ class LandmarkRidgeDetector(RidgeDetector):
 
     kind = "landmarks"
 
-    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+    def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
-        colours = blurred_colours(picture)
+        colours = blurred_colours(image)
         landmarks = {"inner": loop_spline(region.inner_px), "outer": loop_spline(region.outer_px)}
         reach = self.reach * self.interocular_size_px
         contact = dark_lines(colours[0])

@@ -1,4 +1,4 @@
-"""What tells lips from what lies beside them in one picture: planes of a region."""
+"""What tells lips from what lies beside them in one image: planes of a region."""
 
 from __future__ import annotations
 

@@ -49,19 +49,19 @@ def frame_maps(
     least_peak: float,
     lips_px: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, np.ndarray | None, QualityRow]:
-    """Maps of one frame: ((inner, outer) or None, the picture or None, what is to be said of it).
+    """Maps of one frame: ((inner, outer) or None, the image or None, what is to be said of it).
 
     A frame that cannot be read, or has no face, has no maps and an invalid row. `lips_px`: rings
     (n, 2), outer and inner, of the tracked lips, for a detector that starts from them.
     """
     try:
-        picture = source.read(camera, frame)
+        image = source.read(camera, frame)
     except InputError as error:
         return None, None, QualityRow(frame, False, f"unreadable: {error}")
-    reason = usable(landmarks_px, picture.shape) if landmarks_valid else "no landmarks"
+    reason = usable(landmarks_px, image.shape) if landmarks_valid else "no landmarks"
     if reason:
-        return None, picture, QualityRow(frame, False, reason)
-    inner, outer = detector.likelihood(picture, landmarks_px, lips_px)
+        return None, image, QualityRow(frame, False, reason)
+    inner, outer = detector.likelihood(image, landmarks_px, lips_px)
     figures = {
         "inner_peak": peak(inner),
         "outer_peak": peak(outer),
@@ -71,7 +71,7 @@ def frame_maps(
         row = QualityRow(frame, False, "no outer contour found", figures)
     else:
         row = QualityRow(frame, figures=figures)
-    return (inner, outer), picture, row
+    return (inner, outer), image, row
 
 
 def peak(likelihood: np.ndarray) -> float:
@@ -81,7 +81,7 @@ def peak(likelihood: np.ndarray) -> float:
 
 
 def maps_overlay(
-    picture: np.ndarray,
+    image: np.ndarray,
     maps: tuple[np.ndarray, np.ndarray],
     landmarks_px: np.ndarray,
     frame: int,
@@ -93,7 +93,7 @@ def maps_overlay(
     Inner contour red, outer green; contours that a person drew are yellow.
     """
     region = mouth_region(landmarks_px, side_px / 1.1, 0.16)
-    crop = to_display(region.crop(picture))
+    crop = to_display(region.crop(image))
     inner, outer = (np.clip(region.crop(plane), 0, 1)[..., None] for plane in maps)
     mixed = crop * (1 - 0.8 * np.maximum(inner, outer))
     mixed = mixed + 0.8 * (inner * INNER_COLOUR + outer * OUTER_COLOUR)
@@ -107,11 +107,11 @@ def maps_overlay(
     return label(np.hstack([crop, mixed]), f"frame {frame}")
 
 
-def sheet(pictures: list[np.ndarray], columns: int = 3) -> np.ndarray:
-    """A contact sheet; a grey field where there are no pictures."""
-    if not pictures:
+def sheet(images: list[np.ndarray], columns: int = 3) -> np.ndarray:
+    """A contact sheet; a grey field where there are no images."""
+    if not images:
         return np.full((64, 256, 3), 90, dtype=np.uint8)
-    return tile(pictures, columns)
+    return tile(images, columns)
 
 
 def evenly(frames: list[int], count: int) -> set[int]:

@@ -1,4 +1,4 @@
-"""The mouth's region of a picture, upright and at one scale whatever the face's size and roll."""
+"""The mouth's region of an image, upright and at one scale whatever the face's size and roll."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class MouthRegion:
         """Region pixels (N, 2) in the image."""
         return apply_affine(self.image_from_region, points_px)
 
-    def crop(self, picture: np.ndarray) -> np.ndarray:
-        """The region of a picture (h, w, channels), (size, size, channels); edges repeat."""
+    def crop(self, image: np.ndarray) -> np.ndarray:
+        """The region of an image (h, w, channels), (size, size, channels); edges repeat."""
         affine = self.image_from_region.copy()
-        low, high = self._window(picture.shape)
+        low, high = self._window(image.shape)
         affine[:, 2] -= low
-        source = np.ascontiguousarray(picture[low[1] : high[1], low[0] : high[0]], dtype=np.float32)
-        if self.scale > 1.0:  # the picture has more detail than the region can hold
+        source = np.ascontiguousarray(image[low[1] : high[1], low[0] : high[0]], dtype=np.float32)
+        if self.scale > 1.0:  # the image has more detail than the region can hold
             source = cv2.GaussianBlur(source, (0, 0), 0.5 * np.sqrt(self.scale**2 - 0.75))
         return cv2.warpAffine(
             source,
@@ -65,7 +65,7 @@ class MouthRegion:
         )
 
     def _window(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and past-the-end pixel (x, y) of the part of a picture that the region needs."""
+        """Lowest and past-the-end pixel (x, y) of the part of an image that the region needs."""
         corners = self.to_image(np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * self.size_px)
         margin = 2 + 3 * self.scale
         limit = np.array([shape[1], shape[0]])
@@ -74,7 +74,7 @@ class MouthRegion:
         return low, high
 
     def paste(self, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-        """Values (size, size) of the region in a picture of `shape`, zero elsewhere."""
+        """Values (size, size) of the region in an image of `shape`, zero elsewhere."""
         return cv2.warpAffine(
             np.ascontiguousarray(values, dtype=np.float32),
             centred(self.region_from_image),
@@ -121,14 +121,14 @@ def mouth_region(
 
 
 def usable(landmarks_px: np.ndarray, shape: tuple[int, ...]) -> str:
-    """Why landmarks (66, 2) cannot place a mouth in a picture of `shape`; empty if they can."""
+    """Why landmarks (66, 2) cannot place a mouth in an image of `shape`; empty if they can."""
     if not np.isfinite(landmarks_px).all():
         return "no landmarks"
     if interocular_px(landmarks_px) < 16:
         return "the face is too small"
     centre = landmarks_px[MOUTH].mean(axis=0)
     if not ((centre >= 0) & (centre < [shape[1], shape[0]])).all():
-        return "the mouth is outside the picture"
+        return "the mouth is outside the image"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Ridges about borders of the lips that are found in a picture from curves near them.
+"""Ridges about borders of the lips that are found in an image from curves near them.
 
 A curve is moved to the border of the lips' colour as one smooth ring near where it began, and a ridge
 is drawn about it. What is lip-coloured is learnt in each frame by itself.
@@ -66,9 +66,9 @@ class Inside:
     """What else tells the inner border: (size, size) planes.
 
     Attributes:
-        lightness: of the picture.
+        lightness: of the image.
         contact: dark lines, as where lips touch.
-        flesh: where the picture is lips, gums or tongue, 0 or 1.
+        flesh: where the image is lips, gums or tongue, 0 or 1.
         lip: 1 inside the outer border.
     """
 
@@ -180,7 +180,7 @@ class RidgeDetector(ContourDetector):
         return cls(**{k: float(v) if np.ndim(v) == 0 else v for k, v in values.items()})
 
 
-def blurred_colours(picture: np.ndarray) -> np.ndarray:
-    """Colour channels (3, h, w) of a picture (h, w, 3), a little blurred."""
-    colours = image_channels(picture)[:3]
+def blurred_colours(image: np.ndarray) -> np.ndarray:
+    """Colour channels (3, h, w) of an image (h, w, 3), a little blurred."""
+    colours = image_channels(image)[:3]
     return np.stack([cv2.GaussianBlur(plane, (0, 0), BLUR_PX) for plane in colours])

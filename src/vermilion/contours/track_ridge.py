@@ -1,4 +1,4 @@
-"""Likelihood maps where nobody labelled contours: from the tracked lips and all of a take's pictures.
+"""Likelihood maps where nobody labelled contours: from the tracked lips and all of a take's images.
 
 A tracked mouth is the right one up to an error that all frames share: where the model's lips end is
 not where the person's do. So what lies beside each place of the outer contour is learnt from frames
@@ -66,9 +66,9 @@ class TrackRidgeDetector(RidgeDetector):
     middle: np.ndarray = field(default_factory=lambda: np.zeros(0))
     inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def region_likelihood(self, picture: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
+    def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Name of the contour -> (size, size) likelihood of a cropped region."""
-        colours = blurred_colours(picture)
+        colours = blurred_colours(image)
         outer, strength = self.outer_border(colours, region)
         outer = loop_spline(outer)
         strength = np.interp(
@@ -166,27 +166,27 @@ def learn_from_take(
     Args:
         detector: with the settings, no borders yet.
         frames: numbers of those to learn from; what cannot be read or has no mouth is left out.
-        read: frame -> picture (h, w, 3) linear RGB; landmarks_px: frame -> (66, 2); lips_px: frame ->
+        read: frame -> image (h, w, 3) linear RGB; landmarks_px: frame -> (66, 2); lips_px: frame ->
             outer and inner ring (n, 2) of the tracked lips.
         reach: as of `learn_borders`.
     """
-    pictures, regions = [], []
+    images, regions = [], []
     for frame in progress(list(frames), "frames that tell the lips"):
         try:
-            picture = read(frame)
+            image = read(frame)
         except InputError:
             continue  # it is flagged where its maps are drawn
         points = landmarks_px(frame)
-        if usable(points, picture.shape):
+        if usable(points, image.shape):
             continue
         regions.append(detector.region(points, lips_px(frame)))
-        pictures.append(regions[-1].crop(picture))
-    return learn_borders(detector, pictures, regions, reach) if pictures else None
+        images.append(regions[-1].crop(image))
+    return learn_borders(detector, images, regions, reach) if images else None
 
 
 def learn_borders(
     detector: TrackRidgeDetector,
-    pictures: Sequence[np.ndarray],
+    images: Sequence[np.ndarray],
     regions: Sequence[MouthRegion],
     reach: float,
 ) -> TrackRidgeDetector:
@@ -194,11 +194,11 @@ def learn_borders(
 
     Args:
         detector: with the settings, no borders yet.
-        pictures: cropped regions (size, size, 3) linear RGB; regions: theirs, with tracked lips.
+        images: cropped regions (size, size, 3) linear RGB; regions: theirs, with tracked lips.
         reach: how far the outer border may lie from the tracked one, per inter-ocular distance.
     """
     size = detector.interocular_size_px
-    colours = [blurred_colours(picture) for picture in pictures]
+    colours = [blurred_colours(image) for image in images]
     rings = [smoothed_halves(region.outer_px, EDGE_PASSES) for region in regions]
     beside = (BESIDE[0] * size, BESIDE[1] * size)
     # A border at the end of the reach has something on either side of it all the same.

@@ -96,7 +96,7 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class LabelledFrame:
-    """A picture (h, w, 3) linear RGB, its landmarks (66, 2), the contours drawn on it, its number."""
+    """An image (h, w, 3) linear RGB, its landmarks (66, 2), the contours drawn on it, its number."""
 
     linear_rgb: np.ndarray
     landmarks_px: np.ndarray
@@ -117,7 +117,7 @@ def read_labelled(
     Args:
         capture: the capture folder, with `labels/contours/<camera>/`.
         camera: whose labels count.
-        source: the pictures (inpainted, where the lips wear a tattoo).
+        source: the images (inpainted, where the lips wear a tattoo).
         landmarks: of the whole take.
         required: raise InputError where there are none.
         place: subject and take, for messages.
@@ -132,12 +132,12 @@ def read_labelled(
             continue
         drawn = read_label(path, camera=camera, frame=frame, **place)
         try:
-            picture = source.read(camera, frame)
+            image = source.read(camera, frame)
         except InputError as error:
             left_out.append(QualityRow(frame, reason=f"label left out: unreadable: {error}"))
             continue
         points = landmarks.points_px[index[0]]
-        labelled.append(LabelledFrame(picture, points, drawn, frame))
+        labelled.append(LabelledFrame(image, points, drawn, frame))
     if required and not labelled:
         raise InputError(
             "no usable contour labels",
@@ -199,8 +199,8 @@ def _examples(
             name: distance_to(apply_affine(inverse, line), region.size_px)
             for name, line in lines.items()
         }
-        picture = region.crop(frame.linear_rgb)
-        channels = image_channels(picture)
+        image = region.crop(frame.linear_rgb)
+        channels = image_channels(image)
         usable = {name: region.mask.copy() for name in CONTOURS}
         across = region.image_from_region[:, 0]
         segments = [apply_affine(inverse, line) for line in contact_lines(frame.label, across)]

@@ -16,8 +16,8 @@ For known layers and displacements (the oracle):
                                     displacement_mm=displacement_mm, detail_mm=15.0)
 
 Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
-correct several stretches of one person, use one `Corrector`. With a `picture` (`Picture`, of the same
-frames) the corrected heads are laid on it and their lips made to agree with it: see `picture_fit`.
+correct several stretches of one person, use one `Corrector`. With a `image` (`ImageContours`, of the same
+frames) the corrected heads are laid on it and their lips made to agree with it: see `image_fit`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.correction.coherence import smoothed_over_time
-from vermilion.correction.image_agreement import PictureFit
-from vermilion.correction.image_contours import Picture
+from vermilion.correction.image_agreement import ImageAgreement
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.regression.model import LipModel
@@ -82,7 +82,7 @@ def correct_sequence(
     detail_mm: float = 0.0,
     smooth_frames: int = 0,
     frames: np.ndarray | None = None,
-    picture: Picture | None = None,
+    image: ImageContours | None = None,
 ) -> np.ndarray:
     """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
 
@@ -98,7 +98,7 @@ def correct_sequence(
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
     return _in_world(
         corrector.integrator, corrector.correct(head, features[usable], frames[usable]), usable,
-        coarse_mm, neutral_mm, rotation, translation_mm, picture,
+        coarse_mm, neutral_mm, rotation, translation_mm, image,
     )  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def correct_with_layers(
     seam_mm: float = 16.0,
     displacement_mm: np.ndarray | None = None,
     detail_mm: float = 0.0,
-    picture: Picture | None = None,
+    image: ImageContours | None = None,
 ) -> np.ndarray:
     """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,).
 
@@ -130,7 +130,7 @@ def correct_with_layers(
     head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
     return _in_world(
         integrator, integrator.integrate(head, layers[usable], places), usable, coarse_mm,
-        neutral_mm, rotation, translation_mm, picture,
+        neutral_mm, rotation, translation_mm, image,
     )  # fmt: skip
 
 
@@ -142,14 +142,14 @@ def _in_world(
     neutral_mm: np.ndarray,
     rotation: np.ndarray,
     translation_mm: np.ndarray,
-    picture: Picture | None,
+    image: ImageContours | None,
 ) -> np.ndarray:
     """The coarse meshes (F, V, 3), with the corrected ones (usable frames, V, 3) of the head frame."""
     corrected = np.array(coarse_mm, dtype=np.float64)
     pose = rotation[usable], translation_mm[usable]
-    if picture is None or not picture.settings.used:
+    if image is None or not image.settings.used:
         corrected[usable] = world_from_head(head, *pose)
     else:
-        fit = PictureFit.of(integrator, neutral_mm, picture)
-        corrected[usable] = fit.fit(head, corrected[usable], *pose, picture[usable])
+        fit = ImageAgreement.of(integrator, neutral_mm, image)
+        corrected[usable] = fit.fit(head, corrected[usable], *pose, image[usable])
     return corrected

@@ -1,4 +1,4 @@
-"""What the picture says of the lips: lines that the contours of a mesh must project on.
+"""What the image says of the lips: lines that the contours of a mesh must project on.
 
 A found contour point fixes the mesh along the contour's normal only: where along the contour a
 sample belongs is not seen, nor its depth.
@@ -15,21 +15,21 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.search import inward_normals
 from vermilion.geometry.camera import Camera
 
-#: What a picture takes from feature files.
-PICTURE_ARRAYS = ("outer_px", "inner_px", "outer_found", "inner_found", "valid")
+#: What an image takes from feature files.
+IMAGE_ARRAYS = ("outer_px", "inner_px", "outer_found", "inner_found", "valid")
 
 
 @dataclass(frozen=True)
-class PictureSettings:
-    """How the picture counts; all at 0 or False: not at all, which is the paper.
+class ImageContourSettings:
+    """How the image counts; all at 0 or False: not at all, which is the paper.
 
     Attributes:
-        repose: whether the corrected head is laid on the picture again.
+        repose: whether the corrected head is laid on the image again.
         repose_frames: deviation of the symmetric filter over time of that motion, frames.
         contour_weight: of a millimetre of contour beside the mesh's stiffness.
         contour_robust_mm: a contour point this far off counts half.
         closed: lips touch where the inner contour is lower than this, per inter-ocular distance.
-        contact: whether lips that touch in the picture meet, and never pass through each other.
+        contact: whether lips that touch in the image meet, and never pass through each other.
     """
 
     repose: bool = True
@@ -45,12 +45,12 @@ class PictureSettings:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """Lip contours in the pictures of some frames.
+class ImageContours:
+    """Lip contours in the images of some frames.
 
     Attributes:
         face: the model that the mesh is of, for its contours and landmarks.
-        camera: of the pictures.
+        camera: of the images.
         frames: (F,) frame numbers.
         outer_px, inner_px: (F, n, 2) rings of points, sample k found from sample k of the mesh.
         outer_found, inner_found: (F, n) bool.
@@ -64,7 +64,7 @@ class Picture:
     inner_px: np.ndarray
     outer_found: np.ndarray
     inner_found: np.ndarray
-    settings: PictureSettings = field(default_factory=PictureSettings)
+    settings: ImageContourSettings = field(default_factory=ImageContourSettings)
 
     @classmethod
     def of(
@@ -73,16 +73,16 @@ class Picture:
         camera: Camera,
         frames: np.ndarray,
         features: dict[str, np.ndarray],
-        settings: PictureSettings,
-    ) -> Picture:
-        """Of the arrays `PICTURE_ARRAYS` of feature files; in a frame that is not valid nothing is found."""
+        settings: ImageContourSettings,
+    ) -> ImageContours:
+        """Of the arrays `IMAGE_ARRAYS` of feature files; in a frame that is not valid nothing is found."""
         valid = features["valid"][:, None]
         return cls(
             face, camera, np.asarray(frames), features["outer_px"], features["inner_px"],
             features["outer_found"] & valid, features["inner_found"] & valid, settings,
         )  # fmt: skip
 
-    def __getitem__(self, chosen: np.ndarray) -> Picture:
+    def __getitem__(self, chosen: np.ndarray) -> ImageContours:
         """The same of some frames, by rows or (F,) bool."""
         names = ("frames", "outer_px", "inner_px", "outer_found", "inner_found")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
@@ -105,7 +105,7 @@ def frames_around(frames: np.ndarray, known: np.ndarray, reach: int) -> np.ndarr
 def _ring_lines(
     rings_px: np.ndarray, found: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`Picture.lines` of one kind of ring, (F, n, 2) and (F, n)."""
+    """`ImageContours.lines` of one kind of ring, (F, n, 2) and (F, n)."""
     known = found & np.isfinite(rings_px).all(axis=2)
     points, normals = np.nan_to_num(rings_px), np.zeros(rings_px.shape)
     for f, ring in enumerate(points):

@@ -67,7 +67,7 @@ def contour_rows(
 
     Args:
         vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
-        lines: (m, 2) points, (m, 2) normals, (m,) known, of `Picture.lines`.
+        lines: (m, 2) points, (m, 2) normals, (m,) known, of `ImageContours.lines`.
         weight: of a millimetre of contour.
         robust_mm: a point this far off counts half.
     """
@@ -94,7 +94,7 @@ def touch_rows(
     weight: float,
     closed: float,
 ) -> Rows:
-    """Where the inner contour is closed in the picture, its upper and lower samples meet.
+    """Where the inner contour is closed in the image, its upper and lower samples meet.
 
     Args:
         vertices_mm: (V, 3) head frame.

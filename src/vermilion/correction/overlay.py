@@ -1,4 +1,4 @@
-"""Pictures of correction layers: coarse, accurate, and how strong the layer is in between."""
+"""Images of correction layers: coarse, accurate, and how strong the layer is in between."""
 
 from __future__ import annotations
 

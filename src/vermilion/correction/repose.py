@@ -1,8 +1,8 @@
-"""The corrected head laid on the picture again: a rigid motion a frame.
+"""The corrected head laid on the image again: a rigid motion a frame.
 
 A layer corrects the lips beside the rest of the coarse face, and the coarse face was laid on the
-picture with lips of its own. Where its proportions or its distance are a little off, the true lips
-beside it no longer project on the picture's. So the corrected head moves rigidly, until its lip
+image with lips of its own. Where its proportions or its distance are a little off, the true lips
+beside it no longer project on the image's. So the corrected head moves rigidly, until its lip
 contours lie on those found (point to line) while eyes and brows stay where the tracker saw them. The
 motion is small and slow (it makes up for the person's proportions), so it is smoothed over time by a
 filter without lag.
@@ -15,7 +15,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import rotation_matrix
 
-#: Landmarks that stay where they are in the picture: brows and eyes.
+#: Landmarks that stay where they are in the image: brows and eyes.
 ANCHORS = np.r_[17:27, 36:48]
 #: Deviations: of the motion (rotation in rad, shift across and along the view in mm) ...
 _TURN, _ACROSS_MM, _ALONG_MM = 0.05, 10.0, 40.0
@@ -42,7 +42,7 @@ def repose_motion(
     Args:
         anchors_mm: (F, a, 3) world; anchors_px: (F, a, 2) where they belong.
         samples_mm: (F, m, 3) contour samples, world.
-        lines: of `Picture.lines`, (F, m, ...).
+        lines: of `ImageContours.lines`, (F, m, ...).
         pivot_mm: (F, 3).
         unit_px: (F,) inter-ocular distance.
     """

@@ -1,4 +1,4 @@
-"""Landmarks of the neutral picture carried onto a mesh by ray casting."""
+"""Landmarks of the neutral image carried onto a mesh by ray casting."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The correspondence of a take's neutral frame: from tracked meshes and a picture's landmarks."""
+"""The correspondence of a take's neutral frame: from tracked meshes and an image's landmarks."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Neutral:
     Attributes:
         coarse: C in the world.
         accurate: H in the world.
-        camera: of the monocular pictures.
-        points_px: (66, 2) landmarks of its picture.
+        camera: of the monocular images.
+        points_px: (66, 2) landmarks of its image.
         rotation, translation_mm: (3, 3), (3,) `world_from_head` of the tracker.
         subject, take: for messages.
     """
@@ -83,7 +83,7 @@ def correspond_neutrals(
     tracker: FaceModel,
     template: FaceModel,
     *,
-    landmarks: str = "picture",
+    landmarks: str = "image",
     search_distance_mm: float = 25.0,
     max_distance_mm: float = 4.0,
     **settings,
@@ -92,7 +92,7 @@ def correspond_neutrals(
 
     Args:
         tracker, template: models of C's and H's topology, for regions.
-        landmarks: `picture` or `model`, see the configuration.
+        landmarks: `image` or `model`, see the configuration.
         search_distance_mm, max_distance_mm: during registration, and once registered.
         settings: others of `find_correspondence` and `register`.
 

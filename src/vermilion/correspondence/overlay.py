@@ -1,4 +1,4 @@
-"""Pictures of a correspondence, to be looked at once a subject."""
+"""Images of a correspondence, to be looked at once a subject."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCALE_MM = 3.0
 
 
 def portrait_camera(vertices_mm: np.ndarray, size_px: int = 420) -> Camera:
-    """A camera in front of a face in its head frame (V, 3), which fills the picture."""
+    """A camera in front of a face in its head frame (V, 3), which fills the image."""
     low, high = vertices_mm.min(axis=0), vertices_mm.max(axis=0)
     middle, distance = (low + high) / 2, 900.0
     extent = float(max(high[0] - low[0], high[1] - low[1])) * 1.05
@@ -25,7 +25,7 @@ def portrait_camera(vertices_mm: np.ndarray, size_px: int = 420) -> Camera:
 
 
 def correspondence_overlay(
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     coarse_world: Mesh,
     accurate_world: Mesh,
@@ -36,7 +36,7 @@ def correspondence_overlay(
     """Four panels, (h, w, 3) uint8: both meshes' landmarks, the mask, the distances, H on C.
 
     Args:
-        picture: (h, w, 3) uint8 frontal picture of the neutral.
+        image: (h, w, 3) uint8 frontal image of the neutral.
         coarse_world, accurate_world: C and H of that frame, in the camera's world.
         registered: C laid over H, in H's world.
         landmarks: on C and on H.
@@ -45,22 +45,20 @@ def correspondence_overlay(
         points.sample(mesh.vertices_mm, mesh.triangles)
         for points, mesh in zip(landmarks, (coarse_world, accurate_world), strict=True)
     )
-    first = draw_mesh(picture, camera, *_parts(coarse_world), opacity=0.35)
+    first = draw_mesh(image, camera, *_parts(coarse_world), opacity=0.35)
     first = draw_points(first, camera.project(on_coarse), (60, 160, 255), 3)
     first = draw_points(first, camera.project(on_accurate), (255, 70, 60), 2)
     in_mask = np.zeros(len(coarse_world.vertices_mm))
     np.add.at(in_mask, coarse_world.triangles[correspondence.mask], 1)
     colours = np.where(in_mask[:, None] > 0, [0.85, 0.3, 0.25], [0.75, 0.75, 0.75])
     colours[~correspondence.vertices.bound] = [0.2, 0.3, 0.8]
-    second = draw_mesh(picture, camera, *_parts(coarse_world), colours, 0.8)
+    second = draw_mesh(image, camera, *_parts(coarse_world), colours, 0.8)
     distance = np.where(correspondence.vertices.bound, correspondence.distance_mm, np.nan)
-    third = draw_mesh(
-        picture, camera, *_parts(registered), colour_map(distance, 0.0, SCALE_MM), 0.9
-    )
+    third = draw_mesh(image, camera, *_parts(registered), colour_map(distance, 0.0, SCALE_MM), 0.9)
     bound = correspondence.on_coarse(accurate_world.vertices_mm)
     kept = correspondence.vertices.bound[coarse_world.triangles].all(axis=1)
     fourth = draw_mesh(
-        picture, camera, np.nan_to_num(bound), coarse_world.triangles[kept], opacity=1.0
+        image, camera, np.nan_to_num(bound), coarse_world.triangles[kept], opacity=1.0
     )
     panels = [
         label(first, "landmarks on C (blue) and H (red)"),

@@ -1,1 +1,1 @@
-"""Accuracy: errors against truth or a held-out reconstruction, with intervals, pictures, report."""
+"""Accuracy: errors against truth or a held-out reconstruction, with intervals, images, report."""

@@ -1,4 +1,4 @@
-"""Distance of the projected lip contours to those found in the picture."""
+"""Distance of the projected lip contours to those found in the image."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ def contour_error(
     inner_px: np.ndarray,
     interocular_px: np.ndarray,
 ) -> np.ndarray:
-    """Mean distance of the contour points in the picture to the mesh's contours, (F,).
+    """Mean distance of the contour points in the image to the mesh's contours, (F,).
 
     In pixels per pixel of inter-ocular distance. The outer contour is a loop of the mesh. The inner
-    one is what hides the mouth: of each point in the picture, how much higher or lower that is.
+    one is what hides the mouth: of each point in the image, how much higher or lower that is.
 
     Args:
         sequence_mm: (F, V, 3) in the camera's world.
         outer_loop: closed loop of vertices.
         occluding: of the same topology; None: the outer contour alone.
-        outer_px, inner_px: (F, n, 2) rings in the picture; NaN where none was found.
+        outer_px, inner_px: (F, n, 2) rings in the image; NaN where none was found.
         interocular_px: (F,).
     """
     result = np.full(len(sequence_mm), np.nan)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vermilion.correction.correct import Corrector, correct_with_layers
-from vermilion.correction.image_agreement import PictureFit
-from vermilion.correction.image_contours import Picture
+from vermilion.correction.image_agreement import ImageAgreement
+from vermilion.correction.image_contours import ImageContours
 from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.regression.model import LipModel
 from vermilion.regression.training import VARIANTS
@@ -25,7 +25,7 @@ class CoarseTake:
         rotation, translation_mm: `world_from_head`, (F, 3, 3) and (F, 3).
         features: (F, M); NaN where a frame has none.
         seam_mm, detail_mm, smooth_frames: of the integration.
-        picture: of the same frames; None for the paper, which has no such thing.
+        image: of the same frames; None for the paper, which has no such thing.
     """
 
     frames: np.ndarray
@@ -38,17 +38,17 @@ class CoarseTake:
     seam_mm: float
     detail_mm: float = 0.0
     smooth_frames: int = 0
-    picture: Picture | None = None
+    image: ImageContours | None = None
 
     def __getitem__(self, rows: np.ndarray) -> CoarseTake:
         """The same of some frames."""
         names = ("frames", "coarse_mm", "rotation", "translation_mm", "features")
-        picture = None if self.picture is None else self.picture[rows]
-        return replace(self, **{name: getattr(self, name)[rows] for name in names}, picture=picture)
+        image = None if self.image is None else self.image[rows]
+        return replace(self, **{name: getattr(self, name)[rows] for name in names}, image=image)
 
     def as_in_paper(self) -> CoarseTake:
-        """Without the picture, which Lips16 leaves to future work, each frame by itself."""
-        return replace(self, picture=None, smooth_frames=0)
+        """Without the image, which Lips16 leaves to future work, each frame by itself."""
+        return replace(self, image=None, smooth_frames=0)
 
 
 def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
@@ -66,9 +66,9 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
         return corrected, np.nan
     coarse, features, frames = corrected[usable], take.features[usable], take.frames[usable]
     fit = None
-    if take.picture is not None and take.picture.settings.used:
-        fit = PictureFit.of(corrector.integrator, take.neutral_mm, take.picture)
-        picture = take.picture[usable]
+    if take.image is not None and take.image.settings.used:
+        fit = ImageAgreement.of(corrector.integrator, take.neutral_mm, take.image)
+        image = take.image[usable]
 
     def correct(rows: slice) -> np.ndarray:
         of_rows = pose[0][rows], pose[1][rows]
@@ -76,7 +76,7 @@ def corrected_by(model: LipModel, take: CoarseTake) -> tuple[np.ndarray, float]:
         head = corrector.correct(head, features[rows], frames[rows])
         if fit is None:
             return world_from_head(head, *of_rows)
-        return fit.fit(head, coarse[rows], *of_rows, picture[rows])
+        return fit.fit(head, coarse[rows], *of_rows, image[rows])
 
     correct(slice(1))  # compiles and warms what a long take pays for once
     start = time.perf_counter()
@@ -95,7 +95,7 @@ def corrected_by_truth(
     return correct_with_layers(
         mask, layers, take.coarse_mm, take.triangles, take.neutral_mm, take.rotation,
         take.translation_mm, valid=valid, seam_mm=take.seam_mm,
-        displacement_mm=displacement_mm, detail_mm=take.detail_mm, picture=take.picture,
+        displacement_mm=displacement_mm, detail_mm=take.detail_mm, image=take.image,
     )  # fmt: skip
 
 

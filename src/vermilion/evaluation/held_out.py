@@ -92,7 +92,7 @@ def sums_of_contours(
 
     Args:
         sequence_mm, coarse_mm: (F, V, 3) in the camera's world.
-        outer_px, inner_px: (F, n, 2) contour points found in the picture; NaN where none.
+        outer_px, inner_px: (F, n, 2) contour points found in the image; NaN where none.
     """
     eyes = camera.project(coarse_mm[:, tracker.landmarks[list(_EYE_CORNERS)]])
     distance = contour_error(
@@ -151,7 +151,7 @@ def shown_arrays(
         frames (n,), regressors (R,), meshes_mm (R, n, V, 3) in the head frame, errors_mm (R, n, V),
         neutrals_mm (R, V, 3), points_mm (n, V, 3) where they belong, rest_mm (V, 3) of the neutral,
         surface_mm (n, S, 3) and surface_triangles of the reference, triangles, mouth, vermilion,
-        centre_px (n, 2) of the lips and px_per_mm (n,) in the picture.
+        centre_px (n, 2) of the lips and px_per_mm (n,) in the image.
     """
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = shown_rows(base, count)

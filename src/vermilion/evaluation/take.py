@@ -76,7 +76,7 @@ def evaluate_take(
     """Measure `base` and its corrections after one rigid alignment a frame.
 
     Every sequence is aligned on its own face outside the mouth mask: a correction may also have moved
-    the head, to lay it on the picture.
+    the head, to lay it on the image.
 
     Args:
         sequences_mm: regressor -> (F, V, 3) in the tracker's world; has `base`.

@@ -105,7 +105,7 @@ def lip_outline(model: FaceModel, neutral_mm: np.ndarray) -> np.ndarray:
 
 
 class MakeUp:
-    """Draws make-up and the checkerboard on one person's face in pictures of one light.
+    """Draws make-up and the checkerboard on one person's face in images of one light.
 
     Args:
         model, neutral_mm: the tracker's model and the person's neutral (V, 3).
@@ -133,15 +133,15 @@ class MakeUp:
         self.axis_mm = np.median(neutral_mm[:, 2]) - _AXIS_BEHIND_MM
 
     def draw(
-        self, picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray
+        self, image: np.ndarray, camera: Camera, vertices_mm: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The picture with make-up, and with the checkerboard, both (h, w, 3) linear.
+        """The image with make-up, and with the checkerboard, both (h, w, 3) linear.
 
         Args:
-            picture: (h, w, 3) linear RGB of `camera`.
+            image: (h, w, 3) linear RGB of `camera`.
             vertices_mm: (V, 3) in the world.
         """
-        # Twice as fine as the picture, so that outlines are smooth.
+        # Twice as fine as the image, so that outlines are smooth.
         fine = camera.resized(2.0)
         x0, y0, x1, y1 = _box(camera, vertices_mm)
         grid = fine.pixel_grid()[2 * y0 : 2 * y1, 2 * x0 : 2 * x1]
@@ -149,7 +149,7 @@ class MakeUp:
         normals = vertex_normals(vertices_mm, self.triangles) @ camera.rotation.T
         light = irradiance(normalised(interpolate(hits, self.triangles, normals)), self.light)
         found = interpolate(hits, self.triangles, self.values)
-        part = cv2.resize(picture[y0:y1, x0:x1], grid.shape[1::-1], interpolation=cv2.INTER_CUBIC)
+        part = cv2.resize(image[y0:y1, x0:x1], grid.shape[1::-1], interpolation=cv2.INTER_CUBIC)
         part = np.maximum(part, 0.0)
         trusted = hits.hit * np.clip(found[..., 3], 0, 1)
         results = []
@@ -157,9 +157,9 @@ class MakeUp:
             self._make_up(part, found, light, trusted),
             self._checkerboard(part, found, light, trusted),
         ):
-            result = picture.copy()
+            result = image.copy()
             change = cv2.resize(drawn - part, (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-            result[y0:y1, x0:x1] = np.clip(picture[y0:y1, x0:x1] + change, 0, None)
+            result[y0:y1, x0:x1] = np.clip(image[y0:y1, x0:x1] + change, 0, None)
             results.append(result)
         return results[0], results[1]
 
@@ -191,7 +191,7 @@ class MakeUp:
 
 
 def _box(camera: Camera, vertices_mm: np.ndarray) -> tuple[int, int, int, int]:
-    """Left, top, right, bottom (pixels) of the part of the picture that the vertices are in."""
+    """Left, top, right, bottom (pixels) of the part of the image that the vertices are in."""
     pixels = camera.project(vertices_mm)
     size = np.array([camera.width_px, camera.height_px])
     low = np.clip(np.floor(np.nanmin(pixels, axis=0)) - 2, 0, size - 4).astype(int)

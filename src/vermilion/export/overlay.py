@@ -24,7 +24,7 @@ LIPS = (0.86, 0.53, 0.50)
 
 @dataclass(frozen=True)
 class Crop:
-    """The part of a picture that the panels show: x, y of its corner, its size, and its scale."""
+    """The part of an image that the panels show: x, y of its corner, its size, and its scale."""
 
     left: int
     top: int
@@ -32,14 +32,14 @@ class Crop:
     height: int
     scale: float
 
-    def of_picture(self, picture: np.ndarray) -> np.ndarray:
-        """The part of (h, w, 3) uint8, scaled; grey beyond the picture's border."""
-        height, width = picture.shape[:2]
+    def of_image(self, image: np.ndarray) -> np.ndarray:
+        """The part of (h, w, 3) uint8, scaled; grey beyond the image's border."""
+        height, width = image.shape[:2]
         result = np.full((self.height, self.width, 3), 60, dtype=np.uint8)
         x0, y0 = max(self.left, 0), max(self.top, 0)
         x1, y1 = min(self.left + self.width, width), min(self.top + self.height, height)
         if x1 > x0 and y1 > y0:
-            part = picture[y0:y1, x0:x1]
+            part = image[y0:y1, x0:x1]
             result[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left] = part
         method = cv2.INTER_AREA if self.scale < 1 else cv2.INTER_CUBIC
         return cv2.resize(result, self.size, interpolation=method)
@@ -53,7 +53,7 @@ class Crop:
         )
 
     def of_camera(self, camera: Camera) -> Camera:
-        """The camera whose whole picture is this part."""
+        """The camera whose whole image is this part."""
         model = camera.colmap()
         params = np.array(camera.params, dtype=float)
         params[list(model.principal_point_idxs())] -= (self.left, self.top)
@@ -70,17 +70,17 @@ class Crop:
 
 
 def crop_round(
-    points_px: np.ndarray, picture_px: tuple[int, int], margin: float, height_px: int
+    points_px: np.ndarray, image_px: tuple[int, int], margin: float, height_px: int
 ) -> Crop:
-    """The crop round all of (..., 2) projected points, within the picture, `height_px` high when shown.
+    """The crop round all of (..., 2) projected points, within the image, `height_px` high when shown.
 
     NaN points do not count. Half a per cent of points on each side may lie outside. `margin` is a
-    share of the points' extent; `picture_px` is (width, height).
+    share of the points' extent; `image_px` is (width, height).
     """
-    low, high = _extent(points_px, picture_px)
+    low, high = _extent(points_px, image_px)
     pad = margin / 2 * (high - low)
-    low = np.clip(np.floor(low - pad), 0, np.array(picture_px) - 8).astype(int)
-    high = np.clip(np.ceil(high + pad), low + 8, picture_px).astype(int)
+    low = np.clip(np.floor(low - pad), 0, np.array(image_px) - 8).astype(int)
+    high = np.clip(np.ceil(high + pad), low + 8, image_px).astype(int)
     width, height = (int(size) for size in high - low)
     return Crop(int(low[0]), int(low[1]), width, height, height_px / height)
 
@@ -110,12 +110,12 @@ def strips_following(
     return [Crop(int(left), int(top), width, height, scale) for left, top in corners]
 
 
-def _extent(points_px: np.ndarray, picture_px: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Corner with the least and with the greatest coordinates; the picture's without points."""
+def _extent(points_px: np.ndarray, image_px: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Corner with the least and with the greatest coordinates; the image's without points."""
     points = points_px.reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) == 0:
-        return np.zeros(2), np.array(picture_px, dtype=float)
+        return np.zeros(2), np.array(image_px, dtype=float)
     return np.quantile(points, 0.005, axis=0), np.quantile(points, 0.995, axis=0)
 
 
@@ -132,8 +132,8 @@ def lip_colours(triangles: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
     return np.array(SKIN) + share[:, None] * (np.array(LIPS) - SKIN)
 
 
-def overlay_picture(
-    picture: np.ndarray,
+def overlay_image(
+    image: np.ndarray,
     camera: Camera,
     crops: Sequence[Crop],
     meshes: Sequence[tuple[str, np.ndarray | None]],
@@ -145,7 +145,7 @@ def overlay_picture(
     """One frame of the video: a column for the original and one a mesh, a row a crop.
 
     Args:
-        picture: (h, w, 3) uint8 sRGB, the whole frame.
+        image: (h, w, 3) uint8 sRGB, the whole frame.
         crops: of one panel width; the first row carries the labels.
         meshes: (label, (V, 3) world mm) pairs; None where the frame has no mesh.
         colours: (V, 3) in [0, 1].
@@ -153,7 +153,7 @@ def overlay_picture(
     """
     rows = []
     for crop in crops:
-        original, near = crop.of_picture(picture), crop.of_camera(camera)
+        original, near = crop.of_image(image), crop.of_camera(camera)
         panels, names = [original], [caption]
         for name, vertices in meshes:
             tracked = vertices is not None and np.isfinite(vertices).all()

@@ -11,7 +11,7 @@ from vermilion.export.overlay import (
     Crop,
     crop_round,
     lip_colours,
-    overlay_picture,
+    overlay_image,
     strips_following,
 )
 from vermilion.faces.model import FaceModel
@@ -84,21 +84,21 @@ def overlay_frames(
     opacity: float,
     name: str,
 ) -> Iterator[np.ndarray]:
-    """Pictures of the overlay of some frames, (h, w, 3) uint8.
+    """Images of the overlay of some frames, (h, w, 3) uint8.
 
     Args:
-        read: frame -> (h, w, 3) uint8 sRGB; a picture that it cannot read (InputError) is black.
+        read: frame -> (h, w, 3) uint8 sRGB; an image that it cannot read (InputError) is black.
         frames: frame numbers; rows: their rows in the take; valid: whether they were tracked.
         meshes: (label, (F, V, 3) world mm) pairs of these frames.
         name: of the take, for the caption.
     """
     for index, (frame, row, tracked) in enumerate(zip(frames, rows, valid, strict=True)):
         try:
-            picture = read(frame)
+            image = read(frame)
         except InputError:
-            picture = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
+            image = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
         pairs = [(label, vertices[index] if tracked else None) for label, vertices in meshes]
-        yield overlay_picture(
-            picture, camera, [view.face, view.strips[row]], pairs, view.triangles, view.colours,
+        yield overlay_image(
+            image, camera, [view.face, view.strips[row]], pairs, view.triangles, view.colours,
             opacity, f"{name}  frame {frame}",
         )  # fmt: skip

@@ -11,7 +11,7 @@ def arch_depth(ring: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Depth (..., 1) mm of points (..., 3) on the arch a + b x + c y + d x^2 nearest to a ring.
 
     Lips bend round the teeth: a line that kept its sample's depth would leave the face near the
-    corners of the mouth. Points of the picture, (..., 2), have no depth: the answer is (..., 0).
+    corners of the mouth. Points of the image, (..., 2), have no depth: the answer is (..., 0).
 
     Args:
         ring: (n, 3) mm in the head frame, or (n, 2) px.

@@ -23,7 +23,7 @@ class FrameContours:
         outer_px, inner_px: (n, 2).
         model_outer_px, model_inner_px: (n, 2) the coarse mesh's own.
         outer_found, inner_found: (n,) bool; elsewhere the model's contour stands in.
-        interocular_px: inter-ocular distance in the picture.
+        interocular_px: inter-ocular distance in the image.
     """
 
     distances: np.ndarray
@@ -67,12 +67,12 @@ class ContourSampler:
 
         Args:
             vertices_mm: (V, 3) in the world.
-            camera: of the pictures.
+            camera: of the images.
             maps: likelihood maps (inner, outer), (h, w) each; None: the model's own contours are
                 given, none of them found.
             pose: rotation (3, 3) and translation (3,) mm of `world_from_head`: the search and the
                 distances are in the head frame, where a turn of the head is undone (Lips16 7).
-                None: they are in the picture (Lips16 5.1).
+                None: they are in the image (Lips16 5.1).
         """
         unit_px = interocular_px(vertices_mm[self.eye_corners], camera)
         model_outer, model_inner = (r.points(vertices_mm) for r in (self.outer, self.inner))

@@ -9,8 +9,8 @@ of the upper and of the lower half of the outer contour, from the subject's righ
 - `lower_lip_j`, j = 1, 3, 5, 7, 9: from lower(j) to the inner contour found from it.
 
 Height less the lips' widths is the mouth's opening there. All are Euclidean, per inter-ocular
-distance. In the picture they do not change when it is moved, scaled or turned; in the head frame they
-do not change when the head turns out of the picture's plane either (Lips16 7).
+distance. In the image they do not change when it is moved, scaled or turned; in the head frame they
+do not change when the head turns out of the image's plane either (Lips16 7).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which points of the lips form the inner contour in the picture.
+"""Which points of the lips form the inner contour in the image.
 
 It is an occluding contour: as lips open and roll, the line that hides the mouth moves over their
 surface, away from where they meet in the neutral (Lips16 section 6; Anderson et al. 2013).
@@ -19,7 +19,7 @@ from vermilion.geometry.mesh_points import MeshPoints
 _PER_EDGE = 4
 #: Columns of the mouth in each of which the contour is one point.
 _COLUMNS = 40
-#: More than any picture is high (px): columns are sorted by height together, one after the other.
+#: More than any image is high (px): columns are sorted by height together, one after the other.
 _APART = 1e6
 
 

@@ -1,4 +1,4 @@
-"""Picture of what the contour search found."""
+"""Image of what the contour search found."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ OUTER_COLOUR, INNER_COLOUR, MISSING_COLOUR = (70, 255, 90), (255, 70, 60), (255,
 
 
 def contours_overlay(
-    picture: np.ndarray, contours: FrameContours, frame: int, side_px: int = 320
+    image: np.ndarray, contours: FrameContours, frame: int, side_px: int = 320
 ) -> np.ndarray:
     """The mouth (side, side, 3) uint8: model's contours blue, found ones green and red; samples
     without a maximum magenta."""
     region = _region(contours, side_px)
-    canvas = to_display(region.crop(picture))
+    canvas = to_display(region.crop(image))
     for points in (contours.model_outer_px, contours.model_inner_px):
         canvas = draw_polyline(canvas, region.to_region(points), MODEL_COLOUR)
     for points, found, colour in (

@@ -1,4 +1,4 @@
-"""The lips of a tracked mesh as the picture has them: what contour detectors start from."""
+"""The lips of a tracked mesh as the image has them: what contour detectors start from."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class FeatureTable:
     Attributes:
         frames: (F,) int.
         features: (F, M) float64: |psi| shape coefficients in mm, 20 distances per inter-ocular
-            distance, in the head frame where `names` say `head_`, else in the picture.
+            distance, in the head frame where `names` say `head_`, else in the image.
         names: (M,) str.
         outer_px, inner_px: (F, n, 2) contours in the image.
         outer_found, inner_found: (F, n) bool; elsewhere the model's contour stands in.

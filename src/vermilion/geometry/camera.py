@@ -117,7 +117,7 @@ class Camera:
         return np.stack([x, y], axis=-1)
 
     def in_image(self, pixels: np.ndarray, margin_px: float = 0.0) -> np.ndarray:
-        """Which pixels (..., 2) lie in the picture, at least `margin_px` from its border."""
+        """Which pixels (..., 2) lie in the image, at least `margin_px` from its border."""
         x, y = pixels[..., 0], pixels[..., 1]
         with np.errstate(invalid="ignore"):
             return (

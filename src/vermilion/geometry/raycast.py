@@ -77,7 +77,7 @@ class RayCaster:
     def visible(
         self, camera: Camera, points_mm: np.ndarray, tolerance_mm: float = 0.2
     ) -> np.ndarray:
-        """Which points (N, 3) on the surface the camera sees: in the picture and not hidden."""
+        """Which points (N, 3) on the surface the camera sees: in the image and not hidden."""
         pixels = camera.project(points_mm)
         inside = camera.in_image(pixels)
         towards = points_mm - camera.centre_mm

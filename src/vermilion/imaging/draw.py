@@ -1,4 +1,4 @@
-"""Overlays: meshes, points and polylines over pictures (sRGB, 8 bit)."""
+"""Overlays: meshes, points and polylines over images (sRGB, 8 bit)."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ def to_display(linear: np.ndarray) -> np.ndarray:
 
 
 def draw_points(
-    picture: np.ndarray, points_px: np.ndarray, colour: Sequence[int], radius_px: int = 2
+    image: np.ndarray, points_px: np.ndarray, colour: Sequence[int], radius_px: int = 2
 ) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with discs at (N, 2) pixels; NaN is left out."""
-    picture = np.ascontiguousarray(picture).copy()
+    image = np.ascontiguousarray(image).copy()
     for x, y in _fixed(points_px):
-        cv2.circle(picture, (x, y), radius_px << _SHIFT, tuple(colour), -1, cv2.LINE_AA, _SHIFT)
-    return picture
+        cv2.circle(image, (x, y), radius_px << _SHIFT, tuple(colour), -1, cv2.LINE_AA, _SHIFT)
+    return image
 
 
 def draw_polyline(
-    picture: np.ndarray,
+    image: np.ndarray,
     points_px: np.ndarray,
     colour: Sequence[int],
     closed: bool = True,
     width_px: int = 1,
 ) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with a polyline through (N, 2) pixels; NaN is left out."""
-    picture = np.ascontiguousarray(picture).copy()
+    image = np.ascontiguousarray(image).copy()
     points = _fixed(points_px).reshape(-1, 1, 2)
     if len(points):
-        cv2.polylines(picture, [points], closed, tuple(colour), width_px, cv2.LINE_AA, _SHIFT)
-    return picture
+        cv2.polylines(image, [points], closed, tuple(colour), width_px, cv2.LINE_AA, _SHIFT)
+    return image
 
 
 def draw_mesh(
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
@@ -59,11 +59,11 @@ def draw_mesh(
     `colours` (V, 3) in [0, 1]; light grey by default.
     """
     hits = RayCaster(vertices_mm, triangles).see(camera)
-    return paint_mesh(picture, camera, hits, vertices_mm, triangles, colours, opacity)
+    return paint_mesh(image, camera, hits, vertices_mm, triangles, colours, opacity)
 
 
 def paint_mesh(
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     hits: Hits,
     vertices_mm: np.ndarray,
@@ -80,7 +80,7 @@ def paint_mesh(
     albedo = interpolate(hits, triangles, np.asarray(colours, dtype=np.float64))
     shaded = np.clip(albedo * (0.25 + 0.75 * facing)[..., None], 0, 1) * 255
     mask = hits.hit[..., None] * opacity
-    return np.rint(picture * (1 - mask) + shaded * mask).astype(np.uint8)
+    return np.rint(image * (1 - mask) + shaded * mask).astype(np.uint8)
 
 
 def colour_map(values: np.ndarray, low: float, high: float, name: str = "turbo") -> np.ndarray:
@@ -90,26 +90,24 @@ def colour_map(values: np.ndarray, low: float, high: float, name: str = "turbo")
     return np.where(np.isnan(scaled)[..., None], 0.5, rgb)
 
 
-def label(picture: np.ndarray, text: str) -> np.ndarray:
+def label(image: np.ndarray, text: str) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with a line of text in its top left corner."""
-    picture = np.ascontiguousarray(picture).copy()
-    size = max(0.4, picture.shape[1] / 1200)
+    image = np.ascontiguousarray(image).copy()
+    size = max(0.4, image.shape[1] / 1200)
     place = (6, round(24 * size) + 4)
     for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(
-            picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA
-        )
-    return picture
+        cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)
+    return image
 
 
-def tile(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Pictures (h, w, 3) uint8 of any sizes side by side, all scaled to the first one's height."""
-    height = pictures[0].shape[0]
+def tile(images: Sequence[np.ndarray], columns: int) -> np.ndarray:
+    """Images (h, w, 3) uint8 of any sizes side by side, all scaled to the first one's height."""
+    height = images[0].shape[0]
     scaled = [
         p
         if p.shape[0] == height
         else cv2.resize(p, (round(p.shape[1] * height / p.shape[0]), height))
-        for p in pictures
+        for p in images
     ]
     rows = [np.hstack(scaled[i : i + columns]) for i in range(0, len(scaled), columns)]
     width = max(row.shape[1] for row in rows)

@@ -1,4 +1,4 @@
-"""One way to read a take's pictures, wherever they lie: capture folder, frame folder or video."""
+"""One way to read a take's images, wherever they lie: capture folder, frame folder or video."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vermilion.storage.errors import InputError
 
 
 class FrameSource(Protocol):
-    """The pictures of a take."""
+    """The images of a take."""
 
     def read(self, camera: str, frame: int) -> np.ndarray:
         """Linear RGB, (h, w, 3) float32. Raises InputError naming the place."""
 
     def size(self, camera: str) -> tuple[int, int]:
-        """(width, height) of a camera's pictures."""
+        """(width, height) of a camera's images."""
 
 
 class FolderFrames:

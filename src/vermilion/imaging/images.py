@@ -1,4 +1,4 @@
-"""Reading and writing pictures through OpenImageIO; processing is in linear light, float32."""
+"""Reading and writing images through OpenImageIO; processing is in linear light, float32."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def linear_to_srgb(values: np.ndarray) -> np.ndarray:
 
 
 def read_image(path: str | Path, **place) -> np.ndarray:
-    """A picture as linear RGB, (h, w, 3) float32, whatever its format.
+    """An image as linear RGB, (h, w, 3) float32, whatever its format.
 
     8 and 16 bit files are taken as sRGB; EXR and HDR as linear. Raises InputError with the
     `place` (subject, take, camera, frame) where it cannot be read whole.

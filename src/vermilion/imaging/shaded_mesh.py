@@ -1,4 +1,4 @@
-"""A shaded mesh over a picture, one ray a pixel."""
+"""A shaded mesh over an image, one ray a pixel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DISPLAY = np.array([255 * (i / 1023) ** (1 / 1.3) for i in range(1024)])
 
 
 def shade(
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
@@ -33,7 +33,7 @@ def shade(
     hits = RayCaster(vertices_mm, triangles).cast(origins, directions)
     normals = vertex_normals(vertices_mm, triangles) @ camera.rotation.T
     local = np.ascontiguousarray(directions.reshape(-1, 3) @ camera.rotation.T)
-    result = np.ascontiguousarray(picture).copy()
+    result = np.ascontiguousarray(image).copy()
     _shade(
         hits.triangle.ravel(), hits.barycentric.reshape(-1, 3), local,
         np.ascontiguousarray(triangles), np.ascontiguousarray(normals),

@@ -94,22 +94,22 @@ class VideoReader:
         )
 
 
-def write_video(path: str | Path, pictures: Iterable[np.ndarray], fps: float) -> None:
-    """Write (h, w, 3) uint8 sRGB pictures as H.264 in MP4; odd sizes lose one row or column."""
+def write_video(path: str | Path, images: Iterable[np.ndarray], fps: float) -> None:
+    """Write (h, w, 3) uint8 sRGB images as H.264 in MP4; odd sizes lose one row or column."""
     with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        # One thread and no macroblock tree, so that the same pictures give the same bytes: x264's
+        # One thread and no macroblock tree, so that the same images give the same bytes: x264's
         # macroblock tree reads memory that it never wrote on processors with AVX-512.
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": "20", "preset": "veryfast", "threads": "1", "mbtree": "0"}
         started = False
-        for picture in pictures:
-            height, width = (size - size % 2 for size in picture.shape[:2])
+        for image in images:
+            height, width = (size - size % 2 for size in image.shape[:2])
             if not started:
                 stream.width, stream.height = width, height
                 started = True
             frame = av.VideoFrame.from_ndarray(
-                np.ascontiguousarray(picture[:height, :width]), format="rgb24"
+                np.ascontiguousarray(image[:height, :width]), format="rgb24"
             )
             container.mux(stream.encode(frame))
         if started:

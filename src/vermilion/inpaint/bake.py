@@ -1,4 +1,4 @@
-"""Texture of the lips from one or several calibrated pictures of a mesh (Lips16 3.2.1)."""
+"""Texture of the lips from one or several calibrated images of a mesh (Lips16 3.2.1)."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def bake(
     """Blend the views' colours over the domain.
 
     Args:
-        vertices_mm: (V, 3) the mesh at the moment of the pictures.
+        vertices_mm: (V, 3) the mesh at the moment of the images.
         triangles: (T, 3).
         views: (camera, linear RGB (h, w, 3)); the first one sets the colour, the others are
             brought to it by one gain a channel where both see the skin.

@@ -16,7 +16,7 @@ from vermilion.inpaint.opening import Opening
 
 @dataclass(frozen=True)
 class Window:
-    """A rectangle of a picture: left, top, width, height in pixels."""
+    """A rectangle of an image: left, top, width, height in pixels."""
 
     x: int
     y: int
@@ -30,7 +30,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Layer:
-    """What is painted into a window of a picture.
+    """What is painted into a window of an image.
 
     Attributes:
         window: where.
@@ -52,7 +52,7 @@ def window_of(
     triangles: np.ndarray,
     margin_px: int,
 ) -> Window | None:
-    """The rectangle that the domain's vertices project into; None where outside the picture."""
+    """The rectangle that the domain's vertices project into; None where outside the image."""
     pixels = camera.project(vertices_mm[np.unique(triangles[domain.in_domain])])
     pixels = pixels[np.isfinite(pixels).all(axis=1)]
     if not len(pixels):
@@ -112,7 +112,7 @@ def _opened(
     alpha: np.ndarray,
     colour: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Opacity, colour and what is open, with the opening that the picture shows for the mesh's."""
+    """Opacity, colour and what is open, with the opening that the image shows for the mesh's."""
     open_here, near = opening.inside(pixels), opening.near(pixels)
     lacking = near & inner & ~open_here
     painted = (alpha > 0.99) & ~inner & ~open_here
@@ -139,7 +139,7 @@ def softened(layer: Layer, sigma_px: float) -> Layer:
 
 
 def composite(linear: np.ndarray, layer: Layer, rim_px: float, darkest: float = 0.0) -> np.ndarray:
-    """A copy of a picture (h, w, 3), linear, with the layer painted over it.
+    """A copy of an image (h, w, 3), linear, with the layer painted over it.
 
     Pixels without skin (mouth opening, teeth, background) keep their colour, except within `rim_px`
     of the painted lips, where the lens mixed the tattoo into them: there the colour of the pure

@@ -1,4 +1,4 @@
-"""Sharpness and noise of the painted region, matched to the picture round it."""
+"""Sharpness and noise of the painted region, matched to the image round it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def fine_deviation(linear: np.ndarray, where: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(fine - np.median(fine))))
 
 
-def missing_grain(picture: np.ndarray, rendered: np.ndarray, where: np.ndarray) -> float:
+def missing_grain(image: np.ndarray, rendered: np.ndarray, where: np.ndarray) -> float:
     """Deviation of the noise that a rendering lacks, from bare skin that both show."""
-    have, want = fine_deviation(rendered, where), fine_deviation(picture, where)
+    have, want = fine_deviation(rendered, where), fine_deviation(image, where)
     return float(np.sqrt(max(want**2 - have**2, 0.0)))
 
 
@@ -34,7 +34,7 @@ def add_grain(
 ) -> np.ndarray:
     """A copy of (h, w, 3) with grey noise of a display deviation where it is painted.
 
-    The noise has the spectrum of a picture after demosaicing and compression: hardly any at the
+    The noise has the spectrum of an image after demosaicing and compression: hardly any at the
     finest scale.
     """
     if deviation <= 0:

@@ -1,7 +1,7 @@
-"""Where the mouth opens in a tattooed picture: the inner contours of both lips, to a fraction of a pixel.
+"""Where the mouth opens in a tattooed image: the inner contours of both lips, to a fraction of a pixel.
 
 The mesh misses the inner contour by a fraction of a millimetre, or by more where the lips roll; the
-picture shows it, because ink looks like nothing inside a mouth. Across the mouth, column by column, the
+image shows it, because ink looks like nothing inside a mouth. Across the mouth, column by column, the
 contours of both lips move away from where the mesh has them to where ink ends.
 """
 
@@ -33,7 +33,7 @@ _BLUR_COLUMNS = 1.5
 
 @dataclass(frozen=True)
 class Evidence:
-    """How the picture is asked for the contours.
+    """How the image is asked for the contours.
 
     Attributes:
         reach_mm: how far a contour may lie from the mesh's.
@@ -61,10 +61,10 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Opening:
-    """The mouth opening of one picture.
+    """The mouth opening of one image.
 
     Attributes:
-        origin_px: (2,) picture place of column 0, row 0.
+        origin_px: (2,) image place of column 0, row 0.
         along_px, across_px: (2,) steps of a column and of a row.
         columns: (n,) columns at which the lips are seen.
         pixel_mm: size of a pixel on the lips.
@@ -82,13 +82,13 @@ class Opening:
     lower: np.ndarray
 
     def coordinates(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Column and row of places (..., 2) of the picture."""
+        """Column and row of places (..., 2) of the image."""
         steps = np.linalg.inv(np.stack([self.along_px, self.across_px], axis=1))
         column, row = np.moveaxis((pixels - self.origin_px) @ steps.T, -1, 0)
         return column, row
 
     def place(self, column: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """Picture coordinates (..., 2) of columns and rows."""
+        """Image coordinates (..., 2) of columns and rows."""
         return self.origin_px + column[..., None] * self.along_px + row[..., None] * self.across_px
 
     def rows(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -105,7 +105,7 @@ class Opening:
         return there & (row > upper - reach) & (row < lower + reach)
 
     def inside(self, pixels: np.ndarray) -> np.ndarray:
-        """Whether places (..., 2) of the picture lie in the opening."""
+        """Whether places (..., 2) of the image lie in the opening."""
         row, upper, lower, there = self.rows(pixels)
         return there & (row > upper) & (row < lower)
 
@@ -120,10 +120,10 @@ def find_opening(
     pixel_mm: float,
     evidence: Evidence,
 ) -> Opening | None:
-    """The opening between the lips of a tattooed picture; None where no lips are seen.
+    """The opening between the lips of a tattooed image; None where no lips are seen.
 
     Args:
-        linear: (h, w, 3) picture of the camera.
+        linear: (h, w, 3) image of the camera.
         axis: (2,) unit, along the mouth.
         box_px: lowest and highest corner of a rectangle round the lips.
     """
@@ -195,9 +195,9 @@ def _score(
     step_mm: float,
     evidence: Evidence,
 ) -> np.ndarray | None:
-    """(rows, columns) in [-1, 1]: 1 where the picture shows ink, -1 the inside of the mouth.
+    """(rows, columns) in [-1, 1]: 1 where the image shows ink, -1 the inside of the mouth.
 
-    Both are judged by the densities of display colours, learnt from this picture where the mesh is
+    Both are judged by the densities of display colours, learnt from this image where the mesh is
     beyond doubt. None where too little of the lips is seen.
     """
     rows = np.arange(len(lip))[:, None]

@@ -1,4 +1,4 @@
-"""Pictures of what the inpainting did."""
+"""Images of what the inpainting did."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def before_after(
     frame: int, linear: np.ndarray, painted: Painted, height_px: int = 240
 ) -> np.ndarray:
     """The window of one frame before and after, one above the other, (h, w, 3) uint8."""
-    pair = [to_display(picture[painted.window.slices]) for picture in (linear, painted.linear)]
+    pair = [to_display(image[painted.window.slices]) for image in (linear, painted.linear)]
     scale = height_px / pair[0].shape[0]
     size = (max(1, round(pair[0].shape[1] * scale)), height_px)
-    pair = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC) for picture in pair]
+    pair = [cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) for image in pair]
     return np.vstack([label(pair[0], f"{frame}"), pair[1]])
 
 

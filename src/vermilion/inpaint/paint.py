@@ -41,9 +41,9 @@ class Paint:
         lens_px: blur of the camera's lens.
         rim_px: how far that blur reaches into the mouth opening.
         samples: rays a pixel, a side.
-        grain: match the picture's noise.
+        grain: match the image's noise.
         gap_mm: skin closer than this to the painted region is not trusted to be bare.
-        evidence: how the picture is asked where the mouth opens.
+        evidence: how the image is asked where the mouth opens.
     """
 
     domain: LipDomain
@@ -85,10 +85,10 @@ class Painted:
     """A frame without its tattoo.
 
     Attributes:
-        linear: (h, w, 3) float32, the whole picture.
+        linear: (h, w, 3) float32, the whole image.
         window: the rectangle that was worked on.
         composited_px: pixels painted at more than half.
-        border_levels: mean colour difference between the painted texture and the picture on the
+        border_levels: mean colour difference between the painted texture and the image on the
             bare skin next to the border, in levels of 8 bit display colour.
     """
 
@@ -106,10 +106,10 @@ def paint_frame(
     triangles: np.ndarray,
     seed: tuple[int, ...],
 ) -> Painted | None:
-    """Paint the lips of one picture; None where they lie outside of it.
+    """Paint the lips of one image; None where they lie outside of it.
 
     Args:
-        linear: (h, w, 3) picture of `camera`.
+        linear: (h, w, 3) image of `camera`.
         vertices_mm: (V, 3) of H at this frame.
         seed: of the noise.
     """
@@ -128,7 +128,7 @@ def paint_frame(
     darkest = _darkest(paint)
     layer = _shaded_at_seam(paint, layer, opening, frame, linear, caster, camera)
     result = composite(linear, layer, paint.rim_px, darkest)
-    # The same rendering on the bare skin, to compare with the picture.
+    # The same rendering on the bare skin, to compare with the image.
     skin = render_layer(domain, texture, paint.unpainted, caster, camera, window, paint.samples)
     only_skin = skin.opacity > 0.99
     patch = linear[window.slices]
@@ -153,7 +153,7 @@ def _opening(
     vertices_mm: np.ndarray,
     window: Window,
 ) -> Opening | None:
-    """The mouth opening that the picture shows; None where the lips are too small or hidden."""
+    """The mouth opening that the image shows; None where the lips are too small or hidden."""
     ends = camera.project(vertices_mm[paint.domain.corners])
     length = np.linalg.norm(ends[1] - ends[0])
     if not np.isfinite(length) or length < 8.0:
@@ -180,7 +180,7 @@ def _shaded_at_seam(
     caster: RayCaster,
     camera: Camera,
 ) -> Layer:
-    """The layer with the shading that the picture shows next to where the lips meet."""
+    """The layer with the shading that the image shows next to where the lips meet."""
     shading = paint.shading
     if opening is None or shading.mode != "ratio" or shading.seam_mm <= 0:
         return layer
@@ -217,10 +217,10 @@ def _within(opacity: np.ndarray, distance_px: float) -> np.ndarray:
 
 
 def _colour_levels(
-    picture: np.ndarray, rendered: np.ndarray, known: np.ndarray, where: np.ndarray
+    image: np.ndarray, rendered: np.ndarray, known: np.ndarray, where: np.ndarray
 ) -> float:
     if not where.any():
         return 0.0
-    difference = linear_to_srgb(rendered) - linear_to_srgb(picture)
+    difference = linear_to_srgb(rendered) - linear_to_srgb(image)
     smooth, _ = weighted_blur(difference, known.astype(np.float32), 2.0)
     return float(np.abs(smooth[where]).mean() * 255)

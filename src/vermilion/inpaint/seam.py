@@ -25,7 +25,7 @@ def seam_gain(
 
     Args:
         tattooed: the tattooed lips under the layer's own shading.
-        linear: (h, w, 3) the whole picture, with the tattoo.
+        linear: (h, w, 3) the whole image, with the tattoo.
         along_px: deviation of the Gaussian average along the contours.
     """
     step = float(np.linalg.norm(opening.along_px))

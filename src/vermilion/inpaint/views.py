@@ -1,4 +1,4 @@
-"""The pictures of one moment from a rig, the frontal camera first."""
+"""The images of one moment from a rig, the frontal camera first."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from vermilion.storage.errors import InputError
 def read_views(
     source: FrameSource, cameras: dict[str, Camera], frontal: str, frame: int, **place
 ) -> list[tuple[Camera, np.ndarray]]:
-    """(camera, linear picture) of every camera whose picture can be read; the others are logged.
+    """(camera, linear image) of every camera whose image can be read; the others are logged.
 
-    Raises InputError where the frontal picture cannot be read.
+    Raises InputError where the frontal image cannot be read.
     """
     if frontal not in cameras:
         raise InputError(

@@ -1,1 +1,1 @@
-"""66 facial landmarks in pictures: networks, files of other trackers, or a trained regressor."""
+"""66 facial landmarks in images: networks, files of other trackers, or a trained regressor."""

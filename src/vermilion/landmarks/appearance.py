@@ -22,8 +22,8 @@ class AppearanceSettings:
     """Sizes in inter-ocular distances (of the outer eye corners) but for `face_px` and `blur_px`.
 
     Attributes:
-        face_px: inter-ocular distance in the aligned picture.
-        blur_px: deviation of the Gaussian that takes the noise out of the aligned picture.
+        face_px: inter-ocular distance in the aligned image.
+        blur_px: deviation of the Gaussian that takes the noise out of the aligned image.
         eye, mouth: (width, height) of the rectangles.
         tile: side of a tile; a rectangle has the nearest whole number of them.
         patch: side of the square round a landmark.
@@ -39,11 +39,11 @@ class AppearanceSettings:
 
 @dataclass(frozen=True)
 class ReferenceShape:
-    """The reference frame's landmarks in the aligned picture, and what is compared there.
+    """The reference frame's landmarks in the aligned image, and what is compared there.
 
     Attributes:
-        points: (66, 2) px of the aligned picture.
-        size: (width, height) px of the aligned picture.
+        points: (66, 2) px of the aligned image.
+        size: (width, height) px of the aligned image.
         regions: of each region (right eye, left eye, mouth), boxes of its tiles.
         patches: a box for each landmark. A box is (x, y, width, height) in whole px.
     """
@@ -96,7 +96,7 @@ class Appearance:
 def describe(
     grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape, settings: AppearanceSettings
 ) -> Appearance:
-    """Histograms of a picture (h, w) in [0, 1] with landmarks (66, 2), aligned to the reference."""
+    """Histograms of an image (h, w) in [0, 1] with landmarks (66, 2), aligned to the reference."""
     aligned = align(grey, points_px, reference)
     aligned = cv2.GaussianBlur(aligned, (0, 0), settings.blur_px)
     pixels = np.clip(np.rint(aligned * 255), 0, 255).astype(np.uint8)
@@ -106,13 +106,13 @@ def describe(
 
 
 def align(grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape) -> np.ndarray:
-    """The picture (h, w) float32 under the affine map of its landmarks to the reference's."""
-    to_picture = affine_between(reference.points, points_px)
-    scale = np.sqrt(abs(np.linalg.det(to_picture[:, :2])))
+    """The image (h, w) float32 under the affine map of its landmarks to the reference's."""
+    to_image = affine_between(reference.points, points_px)
+    scale = np.sqrt(abs(np.linalg.det(to_image[:, :2])))
     image, shrink = grey.astype(np.float32), 1.0
     while scale * shrink > 1.5 and min(image.shape) > 32:
         image, shrink = cv2.pyrDown(image), shrink * 0.5
-    matrix = to_picture * shrink
+    matrix = to_image * shrink
     # Pixel centres: OpenCV's are whole numbers, ours lie half a pixel further.
     matrix[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP

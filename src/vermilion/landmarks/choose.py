@@ -15,4 +15,4 @@ def open_detector(kind: str, model: str, networks: dict[str, Any]) -> LandmarkDe
         return NetworkDetector(model, NetworkSettings(**networks))
     if kind == "trained":
         return DescentDetector.load(model)
-    raise ValueError(f"no detector '{kind}' that works on pictures")
+    raise ValueError(f"no detector '{kind}' that works on images")

@@ -37,7 +37,7 @@ def settle(
 ) -> KeyFrames:
     """The key frames with points of those `between` corrected by flow from the others.
 
-    Pictures are read twice, once each way, and none is kept: a clip may be a whole take.
+    Images are read twice, once each way, and none is kept: a clip may be a whole take.
 
     Args:
         read_grey: display brightness (h, w) in [0, 1] of a frame; may raise InputError.

@@ -1,4 +1,4 @@
-"""Detected against corrected landmarks over the pictures."""
+"""Detected against corrected landmarks over the images."""
 
 from __future__ import annotations
 
@@ -35,34 +35,34 @@ def correction_overlay(
     """
     rows = np.unique(np.linspace(0, len(corrected.frames) - 1, count).round().astype(int))
     kinds = dict(zip(keys.frames.tolist(), keys.kinds.tolist(), strict=True))
-    pictures = []
+    images = []
     for row in rows:
         frame = int(corrected.frames[row])
         try:
-            picture = to_display(source.read(camera, frame))
+            image = to_display(source.read(camera, frame))
         except InputError:
-            picture = np.zeros((240, 320, 3), dtype=np.uint8)
+            image = np.zeros((240, 320, 3), dtype=np.uint8)
         points = corrected.points_px[row]
         before = detected.points_px[np.searchsorted(detected.frames, frame)]
         text = f"{frame}" + (f": key frame ({kinds[frame]})" if frame in kinds else "")
         if not corrected.valid[row]:
-            pictures.append(label(picture, f"{frame}: no face found"))
+            images.append(label(image, f"{frame}: no face found"))
             continue
         to_cut = _square_round(points)
-        picture = cv2.warpAffine(picture, to_cut, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_AREA)
+        image = cv2.warpAffine(image, to_cut, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_AREA)
         points, before = (p @ to_cut[:, :2].T + to_cut[:, 2] for p in (points, before))
         for loop in (LIP_OUTER, LIP_INNER):
-            picture = draw_polyline(picture, points[loop], _LIPS)
+            image = draw_polyline(image, points[loop], _LIPS)
         if np.isfinite(before).all():
             for a, b in zip(before, points, strict=True):
-                picture = draw_polyline(picture, np.stack([a, b]), _DETECTED, closed=False)
-            picture = draw_points(picture, before, _DETECTED, 2)
-        pictures.append(label(draw_points(picture, points, _CORRECTED, 2), text))
-    return tile(pictures, columns)
+                image = draw_polyline(image, np.stack([a, b]), _DETECTED, closed=False)
+            image = draw_points(image, before, _DETECTED, 2)
+        images.append(label(draw_points(image, points, _CORRECTED, 2), text))
+    return tile(images, columns)
 
 
 def _square_round(points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
-    """Affine map (2, 3) of the square round points (N, 2) to the side of the overlay's pictures."""
+    """Affine map (2, 3) of the square round points (N, 2) to the side of the overlay's images."""
     low, high = points_px.min(axis=0), points_px.max(axis=0)
     half = 0.5 * (1 + 2 * margin) * max(float((high - low).max()), 8.0)
     scale = _SIDE_PX / (2 * half)

@@ -1,6 +1,6 @@
 """Landmarks by supervised descent (Xiong and De la Torre 2013): linear steps in a row.
 
-The picture is brought to the mean shape's place, size and turn; gradient histograms round the
+The image is brought to the mean shape's place, size and turn; gradient histograms round the
 current points predict how each should move. Started from the likeliest faces, the surest wins.
 """
 
@@ -21,19 +21,19 @@ from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
 CELLS = 4
-#: Pixels between the cells of a patch, and blur, in the upright picture.
+#: Pixels between the cells of a patch, and blur, in the upright image.
 SPACING_PX, BLUR_PX = 4.0, 1.8
 N_FEATURES = N_LANDMARKS * CELLS * CELLS * 8
 
 
 def stage_sizes(n_stages: int) -> tuple[int, ...]:
-    """Face size in pixels of the upright picture at each stage: coarse to fine."""
+    """Face size in pixels of the upright image at each stage: coarse to fine."""
     return tuple(int(s) for s in np.rint(np.geomspace(56, 112, n_stages)))
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """Picture pixels = scale * turn @ upright + shift, turn by (cos, sin) in `matrix` (2, 2)."""
+    """Image pixels = scale * turn @ upright + shift, turn by (cos, sin) in `matrix` (2, 2)."""
 
     matrix: np.ndarray
     shift: np.ndarray
@@ -51,18 +51,18 @@ class Similarity:
         return points @ self.matrix.T + self.shift
 
 
-def upright_channels(grey: np.ndarray, to_picture: Similarity, size_px: int) -> np.ndarray:
-    """Blurred orientation channels of the picture resampled into the mean shape's frame.
+def upright_channels(grey: np.ndarray, to_image: Similarity, size_px: int) -> np.ndarray:
+    """Blurred orientation channels of the image resampled into the mean shape's frame.
 
     The mean shape has size 1 about the origin; `size_px` pixels are 1, the origin in the middle.
     """
     side = round(1.9 * size_px)
-    scale = np.sqrt(abs(np.linalg.det(to_picture.matrix))) / size_px
+    scale = np.sqrt(abs(np.linalg.det(to_image.matrix))) / size_px
     image, shrink = grey, 1.0
     while scale * shrink > 2.0 and min(image.shape) > 32:
         image, shrink = cv2.pyrDown(image), shrink * 0.5
-    matrix = to_picture.matrix / size_px
-    corner = to_picture.shift - matrix @ np.array([side / 2, side / 2])
+    matrix = to_image.matrix / size_px
+    corner = to_image.shift - matrix @ np.array([side / 2, side / 2])
     # Pixel centres: OpenCV's are whole numbers, ours lie half a pixel further.
     affine = np.concatenate([matrix, (corner + matrix @ [0.5, 0.5])[:, None]], axis=1) * shrink
     affine[:, 2] -= 0.5
@@ -78,11 +78,11 @@ def upright_channels(grey: np.ndarray, to_picture: Similarity, size_px: int) -> 
 
 def shape_features(grey: np.ndarray, shape: np.ndarray, mean: np.ndarray, size_px: int):
     """Features (66, 128) round a shape (66, 2) px, and the similarity from the mean's frame."""
-    to_picture = Similarity.between(mean, shape)
-    channels = upright_channels(grey, to_picture, size_px)
-    local = (shape - to_picture.shift) @ np.linalg.inv(to_picture.matrix).T
+    to_image = Similarity.between(mean, shape)
+    channels = upright_channels(grey, to_image, size_px)
+    local = (shape - to_image.shift) @ np.linalg.inv(to_image.matrix).T
     pixels = local * size_px + channels.shape[0] / 2 - 0.5
-    return patch_features(channels, pixels, CELLS, SPACING_PX), to_picture
+    return patch_features(channels, pixels, CELLS, SPACING_PX), to_image
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,9 @@ class DescentDetector:
         """All stages from a starting shape (66, 2) px, and how sure each point is."""
         sizes = stage_sizes(len(self.steps))
         for size_px, step in zip(sizes, self.steps, strict=True):
-            features, to_picture = shape_features(grey, shape, self.mean, size_px)
+            features, to_image = shape_features(grey, shape, self.mean, size_px)
             move = features.reshape(-1) @ step[:-1] + step[-1]
-            shape = shape + move.reshape(-1, 2) @ to_picture.matrix.T
+            shape = shape + move.reshape(-1, 2) @ to_image.matrix.T
             if not np.isfinite(shape).all() or face_size_px(shape) < 8:
                 return Landmarks.none()
         features, _ = shape_features(grey, shape, self.mean, sizes[-1])

@@ -1,4 +1,4 @@
-"""Landmarks of the frames of a take, each flagged where no face was found or no picture read."""
+"""Landmarks of the frames of a take, each flagged where no face was found or no image read."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def detect_frames(
 def finder(
     source: FrameSource, camera: str, detector: LandmarkDetector
 ) -> Callable[[int], Landmarks]:
-    """The landmarks of a frame, from its picture."""
+    """The landmarks of a frame, from its image."""
     return lambda frame: detector.detect(source.read(camera, frame))
 
 
@@ -51,26 +51,26 @@ def landmark_overlay(
 ) -> np.ndarray:
     """Frames of a track, evenly spread, with their landmarks; (h, w, 3) uint8."""
     rows = np.unique(np.linspace(0, len(track.frames) - 1, count).round().astype(int))
-    pictures = []
+    images = []
     for row in rows:
         frame = int(track.frames[row])
         try:
-            picture = to_display(source.read(camera, frame))
+            image = to_display(source.read(camera, frame))
         except InputError:
-            picture = np.zeros((240, 320, 3), dtype=np.uint8)
+            image = np.zeros((240, 320, 3), dtype=np.uint8)
         found = Landmarks(track.points_px[row], track.confidence[row], bool(track.valid[row]))
         text = f"{frame}" if found.found else f"{frame}: {NOT_FOUND}"
-        pictures.append(label(draw_landmarks(picture, found), text))
-    return tile(pictures, columns)
+        images.append(label(draw_landmarks(image, found), text))
+    return tile(images, columns)
 
 
-def draw_landmarks(picture: np.ndarray, found: Landmarks) -> np.ndarray:
+def draw_landmarks(image: np.ndarray, found: Landmarks) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
     if not found.found:
-        return picture
-    radius = max(1, round(picture.shape[1] / 400))
+        return image
+    radius = max(1, round(image.shape[1] / 400))
     for loop in (LIP_OUTER, LIP_INNER):
-        picture = draw_polyline(picture, found.points_px[loop], (255, 255, 0))
+        image = draw_polyline(image, found.points_px[loop], (255, 255, 0))
     sure = found.confidence >= 0.5
-    picture = draw_points(picture, found.points_px[sure], (0, 255, 0), radius)
-    return draw_points(picture, found.points_px[~sure], (255, 0, 0), radius)
+    image = draw_points(image, found.points_px[sure], (0, 255, 0), radius)
+    return draw_points(image, found.points_px[~sure], (255, 0, 0), radius)

@@ -15,7 +15,7 @@ from vermilion.storage.arrays import read_arrays, write_arrays
 
 @dataclass(frozen=True)
 class Landmarks:
-    """The landmarks of one face in one picture.
+    """The landmarks of one face in one image.
 
     Attributes:
         points_px: (66, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
@@ -34,10 +34,10 @@ class Landmarks:
 
 
 class LandmarkDetector(Protocol):
-    """Finds the landmarks of the most prominent face, each picture by itself."""
+    """Finds the landmarks of the most prominent face, each image by itself."""
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of a picture (h, w, 3), float32, linear RGB."""
+        """Landmarks of an image (h, w, 3), float32, linear RGB."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Dense flow between consecutive pictures of a face, and points that it carries (Mono13 5.3)."""
+"""Dense flow between consecutive images of a face, and points that it carries (Mono13 5.3)."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _MARGIN = 0.12
 
 @dataclass(frozen=True)
 class PairFlow:
-    """Flow both ways between the crops of two pictures a and b round the face.
+    """Flow both ways between the crops of two images a and b round the face.
 
     Attributes:
         forward, backward: (h, w, 2) float16, crop pixels, from a to b and from b to a.
-        corner_a, corner_b: (2,) picture pixels of the crops' corners.
-        scale: (2,) crop pixels of a picture pixel.
+        corner_a, corner_b: (2,) image pixels of the crops' corners.
+        scale: (2,) crop pixels of an image pixel.
     """
 
     forward: np.ndarray
@@ -59,7 +59,7 @@ class FaceFlow:
     def between(
         self, grey_a: np.ndarray, grey_b: np.ndarray, shape_a: np.ndarray, shape_b: np.ndarray
     ) -> PairFlow:
-        """Flow between two pictures (h, w) in [0, 1], of a face at about (66, 2) px in each."""
+        """Flow between two images (h, w) in [0, 1], of a face at about (66, 2) px in each."""
         low = [shape.min(axis=0) for shape in (shape_a, shape_b)]
         high = [shape.max(axis=0) for shape in (shape_a, shape_b)]
         size = max(face_size_px(shape_a), face_size_px(shape_b))
@@ -79,11 +79,11 @@ class FaceFlow:
 
 
 def carry_along(flows: Sequence[PairFlow], points_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 2) px of the first picture in all pictures of a row (Mono13 eq. 5).
+    """Points (N, 2) px of the first image in all images of a row (Mono13 eq. 5).
 
     Returns:
         (len(flows) + 1, N, 2) px, and (len(flows) + 1, N) px how far the flows have not led back,
-        summed up to each picture.
+        summed up to each image.
     """
     points, astray = [points_px], [np.zeros(len(points_px))]
     for flow in flows:

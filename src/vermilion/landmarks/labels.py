@@ -15,7 +15,7 @@ from vermilion.storage.errors import InputError
 
 @dataclass(frozen=True)
 class LandmarkLabel:
-    """One labelled picture: camera, frame, points (66, 2) in pixels."""
+    """One labelled image: camera, frame, points (66, 2) in pixels."""
 
     camera: str
     frame: int

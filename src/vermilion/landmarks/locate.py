@@ -14,7 +14,7 @@ WINDOW_CELLS = 12
 CELL_PX = 6
 #: Side of the window over the face size.
 WINDOW_PER_FACE = 1.35
-#: Smallest face that is looked for, over the picture's shorter side.
+#: Smallest face that is looked for, over the image's shorter side.
 SMALLEST_FACE = 0.16
 _STEP = 1.19
 
@@ -57,7 +57,7 @@ class FaceLocator:
 
 
 def pyramid(grey: np.ndarray):
-    """Cell maps (scale, cells, pad) of the picture, widened by `pad` px, at each face size."""
+    """Cell maps (scale, cells, pad) of the image, widened by `pad` px, at each face size."""
     window = WINDOW_CELLS * CELL_PX / WINDOW_PER_FACE
     shrink = min(1.0, 1.1 * window / (SMALLEST_FACE * min(grey.shape)))
     if shrink < 1:
@@ -89,11 +89,11 @@ def _apart(found, count):
     return kept
 
 
-def train_locator(pictures: list[np.ndarray], points: np.ndarray, seed: int) -> FaceLocator:
-    """Learn from labelled pictures.
+def train_locator(images: list[np.ndarray], points: np.ndarray, seed: int) -> FaceLocator:
+    """Learn from labelled images.
 
     Args:
-        pictures: N grey pictures (h, w) in [0, 1].
+        images: N grey images (h, w) in [0, 1].
         points: (N, 66, 2) landmarks in pixels.
         seed: of the choice of backgrounds.
     """
@@ -101,7 +101,7 @@ def train_locator(pictures: list[np.ndarray], points: np.ndarray, seed: int) -> 
 
     rng = np.random.default_rng(seed)
     positive, negative = [], []
-    for grey, shape in zip(pictures, points, strict=True):
+    for grey, shape in zip(images, points, strict=True):
         centre = 0.5 * (shape.min(axis=0) + shape.max(axis=0))
         size = face_size_px(shape)
         for scale, cells, pad in pyramid(grey):
@@ -133,5 +133,5 @@ def train_locator(pictures: list[np.ndarray], points: np.ndarray, seed: int) -> 
 
 
 def _mirrored(window: np.ndarray) -> np.ndarray:
-    """A window (8, 12, 12) of the mirrored picture: angle a becomes pi - a."""
+    """A window (8, 12, 12) of the mirrored image: angle a becomes pi - a."""
     return window[(-np.arange(N_ORIENTATIONS)) % N_ORIENTATIONS, :, ::-1]

@@ -39,7 +39,7 @@ class NetworkSettings:
 
 
 class NetworkDetector:
-    """Detects face and landmarks in each picture by itself, so that chunks do not matter."""
+    """Detects face and landmarks in each image by itself, so that chunks do not matter."""
 
     def __init__(self, folder: str | Path, settings: NetworkSettings | None = None):
         self.settings = settings or NetworkSettings()
@@ -58,13 +58,13 @@ class NetworkDetector:
                 return best
         return Landmarks.none()
 
-    def _faces(self, picture: np.ndarray) -> list[np.ndarray]:
+    def _faces(self, image: np.ndarray) -> list[np.ndarray]:
         """Boxes (x, y, width, height) px expected round the landmarks of the faces.
 
         The most prominent face is first.
         """
-        height, width = picture.shape[:2]
-        scores, peaks = _run(self._face, picture)
+        height, width = image.shape[:2]
+        scores, peaks = _run(self._face, image)
         score, radius = scores[0], scores[1] * 112.0
         rows, columns = np.nonzero((score == peaks[0]) & (score >= self.settings.face_threshold))
         boxes = []
@@ -77,14 +77,14 @@ class NetworkDetector:
             boxes.append((score[row, column] * r, box))
         return [box for _, box in sorted(boxes, key=lambda item: -item[0])]
 
-    def _points_in(self, picture: np.ndarray, box: np.ndarray) -> Landmarks:
+    def _points_in(self, image: np.ndarray, box: np.ndarray) -> Landmarks:
         found = Landmarks.none()
         for _ in range(self.settings.passes):
-            crop = _padded(box, picture.shape)
+            crop = _padded(box, image.shape)
             if crop is None:
                 break
             x0, y0, x1, y1 = crop
-            field = _run(self._landmarks, picture[y0:y1, x0:x1])[0]
+            field = _run(self._landmarks, image[y0:y1, x0:x1])[0]
             points, confidence = decode_heat_maps(field)
             points = (points + 0.5) * np.array([x1 - x0, y1 - y0]) / SIZE + [x0, y0]
             found = Landmarks(points, confidence, True)

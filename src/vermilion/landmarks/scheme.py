@@ -1,6 +1,6 @@
 """The 66-point scheme: the 68 points of iBUG 300-W without separate inner mouth corners.
 
-"Left" and "right" below are the picture's: point 0 lies at the subject's right ear.
+"Left" and "right" below are the image's: point 0 lies at the subject's right ear.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ N_LANDMARKS = 66
 JAW = np.arange(0, 17)
 BROWS = np.arange(17, 27)
 NOSE = np.arange(27, 36)
-EYE_RIGHT = np.arange(36, 42)  # the subject's right eye, on the left of the picture
+EYE_RIGHT = np.arange(36, 42)  # the subject's right eye, on the left of the image
 EYE_LEFT = np.arange(42, 48)
 LIP_OUTER = np.array([58, 48, 49, 50, 51, 52, 62, 53, 54, 55, 56, 57])  # closed loop
 LIP_INNER = np.arange(58, 66)  # closed loop; 58 and 62 are the mouth corners
@@ -26,7 +26,7 @@ FROM_68 = np.concatenate(
     [np.arange(48), np.arange(49, 54), np.arange(55, 60), [48], [61, 62, 63], [54], [65, 66, 67]]
 )
 
-#: Point k of a mirrored picture is point MIRROR[k] of the picture.
+#: Point k of a mirrored image is point MIRROR[k] of the image.
 MIRROR = np.concatenate(
     [
         np.arange(16, -1, -1),

@@ -1,4 +1,4 @@
-"""Training of the supervised descent on labelled pictures."""
+"""Training of the supervised descent on labelled images."""
 
 from __future__ import annotations
 
@@ -41,40 +41,40 @@ class TrainingSettings:
     seed: int = 0
 
 
-def labelled_pictures(
+def labelled_images(
     labels: Sequence[tuple[FrameSource, LandmarkLabel]], max_frames: int
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """Pictures (linear RGB) and points (N, 66, 2) of at most `max_frames` labels, evenly spread.
+    """Images (linear RGB) and points (N, 66, 2) of at most `max_frames` labels, evenly spread.
 
     Raises InputError where there are fewer than ten.
     """
     if len(labels) < 10:
         raise InputError(
-            f"{len(labels)} labelled pictures",
+            f"{len(labels)} labelled images",
             "at least ten, better a hundred",
             "Add files to labels/landmarks/<camera>/ of the takes in landmarks.training_takes.",
         )
     chosen = np.unique(np.linspace(0, len(labels) - 1, max_frames).round().astype(int))
-    pictures, points = [], []
+    images, points = [], []
     for index in chosen:
         source, label = labels[index]
-        pictures.append(source.read(label.camera, label.frame))
+        images.append(source.read(label.camera, label.frame))
         points.append(label.points_px)
-    return pictures, np.array(points)
+    return images, np.array(points)
 
 
 def train_descent(
-    pictures: Sequence[np.ndarray], points: np.ndarray, settings: TrainingSettings | None = None
+    images: Sequence[np.ndarray], points: np.ndarray, settings: TrainingSettings | None = None
 ) -> DescentDetector:
     """Learn the locator, the mean shape, the steps and the sureness.
 
     Args:
-        pictures: N pictures (h, w, 3), linear RGB.
+        images: N images (h, w, 3), linear RGB.
         points: (N, 66, 2) px.
     """
     settings = settings or TrainingSettings()
     rng = np.random.default_rng(settings.seed)
-    greys = [grey_of(picture) for picture in pictures]
+    greys = [grey_of(image) for image in images]
     locator = train_locator(greys, points, settings.seed)
     greys, points = with_mirrors(greys, points)
     mean = mean_shape(points)
@@ -84,11 +84,11 @@ def train_descent(
     for number, size_px in enumerate(stage_sizes(settings.stages)):
         features, moves, frames = [], [], []
         for i, shape in progress(zip(owner, shapes, strict=True), f"stage {number}", len(owner)):
-            found, to_picture = shape_features(greys[i], shape, mean, size_px)
-            inverse = np.linalg.inv(to_picture.matrix)
+            found, to_image = shape_features(greys[i], shape, mean, size_px)
+            inverse = np.linalg.inv(to_image.matrix)
             features.append(found.reshape(-1))
             moves.append(((points[i] - shape) @ inverse.T).reshape(-1))
-            frames.append(to_picture.matrix)
+            frames.append(to_image.matrix)
         features = np.array(features, dtype=np.float32)
         step = ridge_regression(features, np.array(moves), settings.ridge)
         steps.append(step.astype(np.float16))
@@ -104,7 +104,7 @@ def train_descent(
 def with_mirrors(
     greys: list[np.ndarray], points: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """The pictures and their mirror images, and their points."""
+    """The images and their mirror images, and their points."""
     flipped = points[:, MIRROR].copy()
     widths = np.array([grey.shape[1] for grey in greys])
     flipped[..., 0] = widths[:, None] - flipped[..., 0]

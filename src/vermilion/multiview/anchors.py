@@ -1,6 +1,6 @@
 """Anchor frames and the clips between them (Beeler et al. 2011, section 4).
 
-The take is cut at regular borders, so that the jobs are known before a picture is read. Near each
+The take is cut at regular borders, so that the jobs are known before an image is read. Near each
 border the frame that looks most like the neutral becomes the anchor; it is registered to the neutral
 directly, so that drift cannot build up past it. Anchors, and then the clips between them, do not
 depend on each other.
@@ -43,7 +43,7 @@ class Anchor:
         frame: its number; -1 where no frame of the window looks enough like the neutral.
         vertices_mm: (V, 3) registered to the neutral; empty without an anchor.
         window: (W,) frames among which it was sought.
-        similarity: (W,) correlation of their pictures with the neutral's, NaN if unreadable.
+        similarity: (W,) correlation of their images with the neutral's, NaN if unreadable.
     """
 
     frame: int
@@ -124,7 +124,7 @@ def choose_anchor(similarity: np.ndarray, threshold: float) -> int | None:
 
 
 def similarities(reference: Reference, frames: Sequence[int], load: LoadFrame) -> np.ndarray:
-    """Correlation (F,) of each frame's pictures with the reference's where the mesh is seen there.
+    """Correlation (F,) of each frame's images with the reference's where the mesh is seen there.
 
     The mean over the cameras; NaN where the frame cannot be read.
     """
@@ -147,7 +147,7 @@ def similarities(reference: Reference, frames: Sequence[int], load: LoadFrame) -
 
 
 def _correlation(a: np.ndarray, b: np.ndarray, mask: np.ndarray, sigma_px: float = 2.0) -> float:
-    """Correlation of two blurred pictures inside a mask."""
+    """Correlation of two blurred images inside a mask."""
     x, y = (cv2.GaussianBlur(p.astype(np.float32), (0, 0), sigma_px)[mask] for p in (a, b))
     x, y = x - x.mean(), y - y.mean()
     return float((x @ y) / max(np.linalg.norm(x) * np.linalg.norm(y), 1e-9))

@@ -1,4 +1,4 @@
-"""Drift against the anchor: the neutral's pictures carried through the mesh, against the real ones.
+"""Drift against the anchor: the neutral's images carried through the mesh, against the real ones.
 
 Wherever the mesh stays on its material points, the neutral's texture, carried to a frame by the
 mesh, is the frame's own. What differs, and how far it would have to move, is the drift.
@@ -44,10 +44,10 @@ class DriftSettings:
 
 @dataclass(frozen=True)
 class Origin:
-    """The neutral's pictures, at the size at which frames are compared with them.
+    """The neutral's images, at the size at which frames are compared with them.
 
     Attributes:
-        frame: its pictures.
+        frame: its images.
         sights: camera name -> what it sees of the neutral.
         triangles: (T, 3).
         regions: name of `REGIONS` -> (V,) bool.
@@ -72,7 +72,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Carried:
-    """The neutral's picture in one camera of a frame.
+    """The neutral's image in one camera of a frame.
 
     Attributes:
         sight: of the frame's mesh.
@@ -102,11 +102,11 @@ def carry(
     settings: DriftSettings,
     sources: Mapping[str, str] | None = None,
 ) -> dict[str, Carried]:
-    """Compare each camera of a frame, that the neutral has too, with the neutral's picture.
+    """Compare each camera of a frame, that the neutral has too, with the neutral's image.
 
     Args:
         vertices_mm: (V, 3) of the frame.
-        sources: camera -> camera whose picture of the neutral is carried; its own by default.
+        sources: camera -> camera whose image of the neutral is carried; its own by default.
     """
     vertices_mm = np.asarray(vertices_mm, dtype=np.float64)
     caster = RayCaster(vertices_mm, origin.triangles)
@@ -153,14 +153,14 @@ def drift_rows(
 
     Figures, NaN where nothing could be measured:
         measured_percent: share of the vertices seen in both frames whose texture was found again.
-        difference_{region}: mean absolute difference of the pictures in local deviations; 0 for
+        difference_{region}: mean absolute difference of the images in local deviations; 0 for
             the same texture, 1.1 for unrelated ones.
         drift_px_{region}, drift_mm_{region}: median length of the flow that is left, in pixels of
-            the full-size pictures, and in mm across the line of sight.
+            the full-size images, and in mm across the line of sight.
         drift_p95_mm_{region}: its 95th percentile.
 
     Args:
-        scale: size of the pictures against the originals.
+        scale: size of the images against the originals.
     """
     parts = {name: _samples(origin, found, scale) for name, found in carried.items()}
     rows = [_row(frame.number, ALL, list(parts.values()))]

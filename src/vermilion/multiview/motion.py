@@ -19,7 +19,7 @@ class Reference:
     """A frame whose mesh is known, and what its cameras see of it.
 
     Attributes:
-        frame: its pictures.
+        frame: its images.
         vertices_mm: (V, 3).
         triangles: (T, 3).
         sights: camera name -> Sight.

@@ -1,4 +1,4 @@
-"""Pictures of what the stage did: mesh over images, clouds, residuals, visibility."""
+"""Images of what the stage did: mesh over images, clouds, residuals, visibility."""
 
 from __future__ import annotations
 
@@ -16,49 +16,49 @@ from vermilion.multiview.take import RefinedFrame
 from vermilion.multiview.views import Frame, View
 
 
-def label(picture: np.ndarray, text: str) -> np.ndarray:
-    """A picture at the sheet's size with a line of text."""
-    return write_label(_reduced(picture), text)
+def label(image: np.ndarray, text: str) -> np.ndarray:
+    """An image at the sheet's size with a line of text."""
+    return write_label(_reduced(image), text)
 
 
 def show(view: View) -> np.ndarray:
-    """The picture of a view as grey RGB, (h, w, 3) uint8."""
+    """The image of a view as grey RGB, (h, w, 3) uint8."""
     grey = np.rint(np.clip(view.grey, 0, 1) * 255).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
 
 
 def show_wires(view: View, vertices_mm: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """The picture with the mesh's edges (E, 2) drawn thinly."""
-    picture = show(view)
+    """The image with the mesh's edges (E, 2) drawn thinly."""
+    image = show(view)
     pixels = view.camera.project(vertices_mm)
     ends = pixels[edges]
     ends = ends[np.isfinite(ends).all(axis=(1, 2))]
     fixed = np.rint((ends - 0.5) * 16).astype(np.int32)
-    lines = picture.copy()
+    lines = image.copy()
     cv2.polylines(lines, list(fixed), False, (90, 255, 140), 1, cv2.LINE_AA, 4)
-    return cv2.addWeighted(lines, 0.6, picture, 0.4, 0)
+    return cv2.addWeighted(lines, 0.6, image, 0.4, 0)
 
 
 def show_cloud(camera: Camera, cloud: Cloud) -> np.ndarray:
     """The cloud from a camera, shaded by its normals."""
-    picture = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+    image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
     if not len(cloud):
-        return picture
+        return image
     towards = camera.centre_mm - cloud.points_mm
     depth = np.linalg.norm(towards, axis=1)
     shade = np.abs((cloud.normals * towards).sum(axis=1)) / depth
     value = np.rint(255 * (0.2 + 0.8 * shade)).astype(np.uint8)
-    return draw_dots(picture, camera, cloud.points_mm, np.repeat(value[:, None], 3, axis=1))
+    return draw_dots(image, camera, cloud.points_mm, np.repeat(value[:, None], 3, axis=1))
 
 
 def draw_dots(
-    picture: np.ndarray, camera: Camera, points_mm: np.ndarray, colours: np.ndarray
+    image: np.ndarray, camera: Camera, points_mm: np.ndarray, colours: np.ndarray
 ) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with points (N, 3) as dots of 2 x 2 pixels, the nearest on top.
 
     `colours` (N, 3) uint8.
     """
-    picture = picture.copy()
+    image = image.copy()
     depth = np.linalg.norm(camera.centre_mm - points_mm, axis=1)
     pixels = camera.project(points_mm)
     inside = camera.in_image(pixels, 1.0)
@@ -68,8 +68,8 @@ def draw_dots(
         for right in (0, 1):
             y = np.minimum(row + down, camera.height_px - 1)
             x = np.minimum(column + right, camera.width_px - 1)
-            picture[y, x] = colours[inside][order]
-    return picture
+            image[y, x] = colours[inside][order]
+    return image
 
 
 def pick_cameras(frame: Frame, target_mm: np.ndarray, count: int = 2) -> list[str]:
@@ -100,42 +100,40 @@ def neutral_sheet(
 
     For a later take of a person also how far its own fit lay from the first take's points.
     """
-    pictures = []
+    images = []
     error = np.where(
         neutral.information > 0, 1.0 / np.sqrt(np.maximum(neutral.information, 1e-12)), np.nan
     )
     colours = colour_map(error, 0.0, 0.3)
     for name in pick_cameras(frame, neutral.vertices_mm.mean(axis=0)):
         view = frame.views[name]
-        picture, camera = show(view), view.camera
+        image, camera = show(view), view.camera
         landmarks = camera.project(neutral.landmarks.points_mm)
         surface = neutral.surface
-        pictures += [
-            label(draw_points(picture, landmarks, (255, 80, 80)), f"{name}: landmarks"),
+        images += [
+            label(draw_points(image, landmarks, (255, 80, 80)), f"{name}: landmarks"),
             label(show_wires(view, neutral.vertices_mm, edges), "template"),
             label(show_cloud(camera, neutral.cloud), "stereo points"),
+            label(draw_mesh(0 * image, camera, surface.vertices_mm, surface.triangles), "Poisson"),
+            label(draw_mesh(0 * image, camera, neutral.vertices_mm, triangles), "mesh"),
             label(
-                draw_mesh(0 * picture, camera, surface.vertices_mm, surface.triangles), "Poisson"
-            ),
-            label(draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles), "mesh"),
-            label(
-                draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles, colours),
+                draw_mesh(0 * image, camera, neutral.vertices_mm, triangles, colours),
                 "expected error, 0 to 0.3 mm",
             ),
         ]
         if neutral.first_take:
             moved = colour_map(neutral.moved_mm, 0.0, 5.0)
             text = f"to the points of {neutral.first_take}, 0 to 5 mm"
-            mesh = draw_mesh(0 * picture, camera, neutral.vertices_mm, triangles, moved)
-            pictures.append(label(mesh, text))
-    return tile(pictures, 7 if neutral.first_take else 6)
+            mesh = draw_mesh(0 * image, camera, neutral.vertices_mm, triangles, moved)
+            images.append(label(mesh, text))
+    return tile(images, 7 if neutral.first_take else 6)
 
 
 def frames_sheet(
     shown: Sequence[tuple[Frame, RefinedFrame]], triangles: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
     """For some frames of a chunk: wires, mesh, cloud, residual and visibility in two cameras."""
-    pictures = []
+    images = []
     for frame, refined in shown:
         registered = refined.registered
         vertices = registered.vertices_mm
@@ -145,7 +143,7 @@ def frames_sheet(
         for name in pick_cameras(frame, vertices.mean(axis=0)):
             view = frame.views[name]
             empty, camera = 0 * show(view), view.camera
-            pictures += [
+            images += [
                 label(show_wires(view, vertices, edges), f"frame {frame.number} {name}"),
                 label(draw_mesh(empty, camera, vertices, triangles), "mesh"),
                 label(show_cloud(camera, refined.cloud), "stereo points"),
@@ -158,15 +156,15 @@ def frames_sheet(
                     "cameras, 0 to 10; grey: unseen",
                 ),
             ]
-    if not pictures:  # no frame of the chunk could be registered
-        pictures = [label(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
-    return tile(pictures, 5)
+    if not images:  # no frame of the chunk could be registered
+        images = [label(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
+    return tile(images, 5)
 
 
-def _reduced(picture: np.ndarray, height_px: int = 360) -> np.ndarray:
+def _reduced(image: np.ndarray, height_px: int = 360) -> np.ndarray:
     """At most `height_px` high."""
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     if height <= height_px:
-        return picture
+        return image
     size = (round(width * height_px / height), height_px)
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)

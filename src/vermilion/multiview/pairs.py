@@ -155,8 +155,8 @@ def rectify(a: Camera, b: Camera, target_mm: np.ndarray, reach_mm: float) -> Rec
     return Rectified(left, right, int(np.floor(low - 1)), count)
 
 
-def rectified_picture(original: Camera, image: np.ndarray, turned: Camera):
-    """(picture in the turned camera, mask of pixels that the original has), same centre."""
+def rectified_image(original: Camera, image: np.ndarray, turned: Camera):
+    """(image in the turned camera, mask of pixels that the original has), same centre."""
     rows = turned.pixel_grid()
     k = turned.calibration
     local = np.stack(

@@ -1,4 +1,4 @@
-"""Image motion between a picture predicted through the mesh and the real one."""
+"""Image motion between an image predicted through the mesh and the real one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Sight:
 
     Attributes:
         pixels: (V, 2) where they project.
-        visible: (V,) bool: in the picture, facing the camera, not hidden.
+        visible: (V,) bool: in the image, facing the camera, not hidden.
         cosine: (V,) of the angle between normal and viewing ray, positive when facing.
     """
 
@@ -30,11 +30,11 @@ class Sight:
 
 @dataclass(frozen=True)
 class Motion:
-    """Where a camera's picture says the vertices are.
+    """Where a camera's image says the vertices are.
 
     Attributes:
         offset_px: (V, 2) from where they project now.
-        weight: (V,) in [0, 1], zero where the camera does not see the vertex or the pictures
+        weight: (V,) in [0, 1], zero where the camera does not see the vertex or the images
             disagree.
     """
 
@@ -67,7 +67,7 @@ class Raster:
     """The mesh as the pixels of a camera's window see it; shared by all that is predicted there.
 
     Attributes:
-        left_px, top_px: where the window begins in the picture.
+        left_px, top_px: where the window begins in the image.
         camera: of the window.
         corners: (h', w', 3) vertices of the triangle that each ray hits.
         hits: of one ray every few pixels.
@@ -79,10 +79,10 @@ class Raster:
     corners: np.ndarray
     hits: Hits
 
-    def cut(self, picture: np.ndarray) -> np.ndarray:
-        """The window of a picture (h, w)."""
+    def cut(self, image: np.ndarray) -> np.ndarray:
+        """The window of an image (h, w)."""
         bottom, right = self.top_px + self.camera.height_px, self.left_px + self.camera.width_px
-        return picture[self.top_px : bottom, self.left_px : right]
+        return image[self.top_px : bottom, self.left_px : right]
 
 
 def rasterise(
@@ -117,13 +117,13 @@ def rasterise(
 def warp_to(
     raster: Raster, source_px: np.ndarray, source_visible: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where each pixel of a window comes from in another picture, through the mesh.
+    """Where each pixel of a window comes from in another image, through the mesh.
 
     Between rays the map is bilinear.
 
     Args:
-        source_px: (V, 2) of the vertices in the other picture.
-        source_visible: (V,) bool in the other picture.
+        source_px: (V, 2) of the vertices in the other image.
+        source_visible: (V,) bool in the other image.
 
     Returns:
         (map (h, w, 2) float32 pixels, mask (h, w) bool).
@@ -146,7 +146,7 @@ def warp_to(
 
 
 class FlowMatcher:
-    """Dense flow between normalised pictures (DIS, Kroeger et al. 2016), with its agreement."""
+    """Dense flow between normalised images (DIS, Kroeger et al. 2016), with its agreement."""
 
     def __init__(self, window_px: int = 9):
         """`window_px` is the width of the correlation that judges the flow.
@@ -163,7 +163,7 @@ class FlowMatcher:
         self.window_px = window_px
 
     def flow(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """(h, w, 2) with a(x) ~ b(x + flow(x)); pictures (h, w) uint8."""
+        """(h, w, 2) with a(x) ~ b(x + flow(x)); images (h, w) uint8."""
         return self._flow.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), None)
 
     def agreement(self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray):
@@ -185,7 +185,7 @@ class FlowMatcher:
     def round_trip(self, flow: np.ndarray, back: np.ndarray) -> np.ndarray:
         """Distance (h, w) px by which flow there and flow back (h, w, 2) miss the start.
 
-        What one picture hides has no way back.
+        What one image hides has no way back.
         """
         height, width = flow.shape[:2]
         x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
@@ -198,19 +198,19 @@ class FlowMatcher:
         )
         return np.linalg.norm(flow + returned, axis=2)
 
-    def _blur(self, picture):
-        return cv2.blur(picture, (self.window_px, self.window_px))
+    def _blur(self, image):
+        return cv2.blur(image, (self.window_px, self.window_px))
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A picture predicted through the mesh against the real one, in a window.
+    """An image predicted through the mesh against the real one, in a window.
 
     Attributes:
         raster: of the window.
         predicted, real: (h, w) uint8, locally normalised; `predicted` is `real` outside the mask.
         mask: (h, w) bool, where there is a prediction.
-        flow: (h, w, 2) from the predicted to the real picture, px.
+        flow: (h, w, 2) from the predicted to the real image, px.
         agreement: (h, w) local correlation after the flow.
     """
 
@@ -225,11 +225,11 @@ class Comparison:
 def compare(
     matcher: FlowMatcher, raster: Raster, view: View, reference: View, reference_sight: Sight
 ) -> Comparison:
-    """Carry the picture of `reference` through the mesh to `view`, and find what moved there.
+    """Carry the image of `reference` through the mesh to `view`, and find what moved there.
 
     Args:
         raster: of the mesh as it is thought to stand in the view.
-        reference, reference_sight: another picture of the same surface (another frame or camera).
+        reference, reference_sight: another image of the same surface (another frame or camera).
     """
     where, mask = warp_to(raster, reference_sight.pixels, reference_sight.visible)
     real = raster.cut(view.normalised)
@@ -249,7 +249,7 @@ def compare(
 def motion_at(
     found: Comparison, seen: Sight, reference_sight: Sight, min_agreement: float = 0.4
 ) -> Motion:
-    """The flow of a comparison at the vertices that both pictures see."""
+    """The flow of a comparison at the vertices that both images see."""
     inside = seen.pixels - [found.raster.left_px, found.raster.top_px]
     stack = np.dstack([found.flow, found.agreement, found.mask.astype(np.float32)])
     at = sample(stack, inside)
@@ -269,12 +269,12 @@ def measure_motion(
     *,
     min_agreement: float = 0.4,
 ) -> Motion:
-    """Flow from the picture predicted out of `reference` to the real `view`, at the vertices.
+    """Flow from the image predicted out of `reference` to the real `view`, at the vertices.
 
     Args:
         raster: of the mesh as it is thought to stand in the view; None where it is not seen.
         seen: of `view.camera`, the same mesh.
-        reference, reference_sight: another picture of the same surface (another frame or camera).
+        reference, reference_sight: another image of the same surface (another frame or camera).
     """
     if raster is None:
         return Motion(np.zeros_like(seen.pixels), np.zeros(len(seen.pixels)))

@@ -1,6 +1,6 @@
 """Photo-consistency between cameras: the surface of one frame to a small part of a pixel.
 
-The mesh predicts one camera's picture from another's; the flow to the real picture, taken along
+The mesh predicts one camera's image from another's; the flow to the real image, taken along
 the ray of the first camera, says how far the surface lies in front of or behind the mesh.
 """
 

@@ -1,7 +1,7 @@
-"""One frame registered directly to the reference frame's pictures: no drift, any order.
+"""One frame registered directly to the reference frame's images: no drift, any order.
 
-Each camera's picture is predicted by carrying the reference picture of the same camera through the
-mesh; the flow to the real picture gives every visible vertex a displacement in every camera that
+Each camera's image is predicted by carrying the reference image of the same camera through the
+mesh; the flow to the real image gives every visible vertex a displacement in every camera that
 sees it; a robust solve brings them together with the shape prior and the frame's stereo points.
 """
 
@@ -58,7 +58,7 @@ def register_frame(
         sigma_px: expected error of a measurement.
         max_step_mm: longest step of a vertex in a round.
         min_agreement: correlation below which a measurement is not used.
-        stride_px: distance of the rays that predict a picture.
+        stride_px: distance of the rays that predict an image.
         cloud, cloud_allowed, cloud_gate_mm: the frame's stereo points and which vertices (V,)
             they may pull.
     """

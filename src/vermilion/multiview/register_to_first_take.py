@@ -22,7 +22,7 @@ def with_points_of(first: Refiner, take: str, frame: Frame, own: Neutral) -> tup
     """A later take's neutral on the points of the skin that the first take's vertices mark.
 
     Args:
-        first: registers pictures to the neutral of the first take, `take`.
+        first: registers images to the neutral of the first take, `take`.
         frame: of the later take, with the expression of a neutral, cameras named as in the first.
         own: the template fitted to that frame; it says where the head is.
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vermilion.geometry.mesh import normalised
-from vermilion.multiview.pairs import Rectified, rectified_picture, rectify
+from vermilion.multiview.pairs import Rectified, rectified_image, rectify
 from vermilion.multiview.views import View
 
 
@@ -62,14 +62,14 @@ def match_pair(
         target_mm, reach_mm: the scene lies within `reach_mm` of the point.
         consistency_px: largest left-right disagreement of a disparity.
         speckle_px: connected regions of fewer pixels are dropped.
-        min_texture: smallest local deviation of the normalised picture (of 255).
+        min_texture: smallest local deviation of the normalised image (of 255).
         masks: pixels (h, w) bool of the two views that may be matched; None for all.
     """
     pair = rectify(a.camera, b.camera, target_mm, reach_mm)
     left, left_inside = _turned(a, pair.left, masks[0])
     right, right_inside = _turned(b, pair.right, masks[1])
     disparity = _disparity(left, right, pair, block_px, uniqueness_percent)
-    # the same matcher, right to left, on mirrored pictures
+    # the same matcher, right to left, on mirrored images
     mirrored = _disparity(right[:, ::-1], left[:, ::-1], pair, block_px, uniqueness_percent)
     back = mirrored[:, ::-1]
     height, width = disparity.shape
@@ -91,15 +91,15 @@ def match_pair(
 
 
 def _turned(view: View, camera, mask):
-    picture, inside = rectified_picture(view.camera, view.normalised, camera)
+    image, inside = rectified_image(view.camera, view.normalised, camera)
     if mask is not None:
-        allowed, _ = rectified_picture(view.camera, mask.astype(np.uint8) * 255, camera)
+        allowed, _ = rectified_image(view.camera, mask.astype(np.uint8) * 255, camera)
         inside = inside & (allowed > 127)
-    return picture, inside
+    return image, inside
 
 
 def _disparity(left, right, pair: Rectified, block_px: int, uniqueness_percent: int):
-    """x_left - x_right (h, w) float32, NaN where unmatched. Pictures are padded by the range."""
+    """x_left - x_right (h, w) float32, NaN where unmatched. Images are padded by the range."""
     pad = pair.n_disparities
     border = [
         cv2.copyMakeBorder(np.ascontiguousarray(p), 0, 0, pad, pad, cv2.BORDER_CONSTANT)
@@ -121,8 +121,8 @@ def _disparity(left, right, pair: Rectified, block_px: int, uniqueness_percent: 
     return np.where(fixed >= pair.min_disparity_px * 16, disparity, np.nan)
 
 
-def _texture(picture, block_px):
-    value = picture.astype(np.float32)
+def _texture(image, block_px):
+    value = image.astype(np.float32)
     mean = cv2.blur(value, (block_px, block_px))
     square = cv2.blur(value * value, (block_px, block_px))
     return np.sqrt(np.maximum(square - mean * mean, 0))

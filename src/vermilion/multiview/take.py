@@ -1,4 +1,4 @@
-"""One take's pictures and reference at every resolution; each frame's final registration."""
+"""One take's images and reference at every resolution; each frame's final registration."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ImageSettings:
     floor: float
 
     def window_at(self, scale: float) -> float:
-        """Small pictures keep a somewhat wider window than their scale says."""
+        """Small images keep a somewhat wider window than their scale says."""
         return self.window_px * np.sqrt(scale)
 
 
@@ -54,7 +54,7 @@ class RefineSettings:
 
 
 @dataclass(frozen=True)
-class Pictures:
+class MultiviewImages:
     """Reads a take's frames at any resolution."""
 
     source: FrameSource
@@ -73,18 +73,22 @@ class Pictures:
         return shrunk(frame, scale, self.settings.window_at(scale), self.settings.floor)
 
 
-#: Frames whose small pictures are kept in memory, about 3 MB each for ten cameras.
+#: Frames whose small images are kept in memory, about 3 MB each for ten cameras.
 KEPT_FRAMES = 100
 
 
 def open_coarse(
-    pictures: Pictures, number: int, vertices_mm: np.ndarray, triangles: np.ndarray, scale: float
+    images: MultiviewImages,
+    number: int,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    scale: float,
 ) -> tuple[Reference, Callable[[int], Frame]]:
     """A frame whose mesh (V, 3) is known, at a smaller size, and a reader of frames of that size."""
 
     @lru_cache(maxsize=KEPT_FRAMES)
     def load(number: int) -> Frame:
-        return pictures.load(number, scale)
+        return images.load(number, scale)
 
     return Reference.of(load(number), vertices_mm, triangles), load
 
@@ -112,7 +116,7 @@ def skin_of(model: FaceModel) -> np.ndarray:
 
 
 def frame_cloud(
-    pictures: Pictures,
+    images: MultiviewImages,
     frame: Frame,
     vertices_mm: np.ndarray,
     model: FaceModel,
@@ -125,7 +129,7 @@ def frame_cloud(
         return Cloud.join([])
     stereo = replace(stereo, speckle_px=round(stereo.speckle_px * scale**2))
     try:
-        raw = stereo_cloud(pictures.at(frame, scale), vertices_mm.mean(axis=0), stereo)
+        raw = stereo_cloud(images.at(frame, scale), vertices_mm.mean(axis=0), stereo)
     except InputError:  # the cameras left make no stereo pair
         return Cloud.join([])
     mesh = Mesh(np.asarray(vertices_mm, dtype=np.float64), model.triangles)
@@ -137,7 +141,7 @@ class Refiner:
 
     def __init__(
         self,
-        pictures: Pictures,
+        images: MultiviewImages,
         model: FaceModel,
         neutral_frame: int,
         neutral_mm: np.ndarray,
@@ -145,13 +149,13 @@ class Refiner:
         settings: RefineSettings,
         matcher: FlowMatcher,
     ):
-        self.pictures, self.model, self.settings, self.matcher = pictures, model, settings, matcher
+        self.images, self.model, self.settings, self.matcher = images, model, settings, matcher
         self.neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
-        frame = pictures.load(neutral_frame)
+        frame = images.load(neutral_frame)
         self.plate = ThinPlate.of(self.neutral_mm, model.triangles)
         self.references = {
             scale: Reference.of(
-                pictures.at(frame, scale), self.neutral_mm, model.triangles, self.plate
+                images.at(frame, scale), self.neutral_mm, model.triangles, self.plate
             )
             for scale in set(settings.scales)
         }
@@ -173,7 +177,7 @@ class Refiner:
         The neutral's frame is the neutral.
         """
         try:
-            frame = self.pictures.load(number)
+            frame = self.images.load(number)
         except InputError as error:
             return self._failed(number, start_mm, str(error))
         finest = self.references[self.settings.scales[-1]]
@@ -184,10 +188,10 @@ class Refiner:
     def register(
         self, frame: Frame, start_mm: np.ndarray, *, from_afar: bool = False
     ) -> RefinedFrame:
-        """Register the pictures of a frame, be it of this take or of another one of the person.
+        """Register the images of a frame, be it of this take or of another one of the person.
 
         Args:
-            frame: full-size pictures of cameras named as those of the neutral.
+            frame: full-size images of cameras named as those of the neutral.
             start_mm: (V, 3).
             from_afar: begin with a round of twice the stiffness.
         """
@@ -199,7 +203,7 @@ class Refiner:
         if from_afar:
             rounds.insert(0, (rounds[0][0], 2 * rounds[0][1]))
         levels = [
-            (self.references[scale], self.pictures.at(frame, scale), length)
+            (self.references[scale], self.images.at(frame, scale), length)
             for scale, length in rounds
         ]
         registered = register_frame(
@@ -232,9 +236,7 @@ class Refiner:
         return RefinedFrame(registered, contact, cloud, quality)
 
     def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:
-        return frame_cloud(
-            self.pictures, frame, vertices_mm, self.model, self.stereo, self.settings
-        )
+        return frame_cloud(self.images, frame, vertices_mm, self.model, self.stereo, self.settings)
 
     def _quality(self, number, frame, registered, contact, cloud) -> QualityRow:
         measured = self.seen_at_neutral & np.isfinite(registered.residual_px)

@@ -41,7 +41,7 @@ class Track:
     Attributes:
         frames: (F,) frame numbers.
         coarse_mm: (F, V, 3) float32.
-        similarity: (F,) correlation of the pictures with the neutral's; NaN where no anchor was
+        similarity: (F,) correlation of the images with the neutral's; NaN where no anchor was
             sought or the frame is unreadable.
         anchors: (F,) bool.
         reasons: (F,) empty, or why the frame could not be tracked.
@@ -121,7 +121,7 @@ def follow(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> np.ndarray:
-    """Carry a mesh from one frame to the next by the flow between their pictures, (V, 3) mm.
+    """Carry a mesh from one frame to the next by the flow between their images, (V, 3) mm.
 
     Flow that does not lead back to where it began, and flow between unlike places, weighs less.
     """

@@ -1,4 +1,4 @@
-"""The pictures of one frame as the stage uses them: undistorted, grey, locally normalised."""
+"""The images of one frame as the stage uses them: undistorted, grey, locally normalised."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from vermilion.imaging.images import linear_to_srgb
 from vermilion.storage.errors import InputError
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-#: Grey levels of one local deviation in a normalised picture.
+#: Grey levels of one local deviation in a normalised image.
 DEVIATION = 40
 
 
 @dataclass(frozen=True)
 class View:
-    """One camera's picture of one frame.
+    """One camera's image of one frame.
 
     Attributes:
-        camera: a pinhole camera; distortion has been taken out of the picture.
+        camera: a pinhole camera; distortion has been taken out of the image.
         grey: (h, w) float32 sRGB luma in [0, 1].
         normalised: (h, w) uint8, local mean 128 and local deviation 40 where there is texture.
     """
@@ -54,11 +54,11 @@ def make_view(
     """Undistort, take the luma, normalise locally.
 
     Args:
-        camera: of the picture; any COLMAP model.
+        camera: of the image; any COLMAP model.
         linear_rgb: (h, w, 3) float32.
         window_px: standard deviation of the Gaussian window of the local mean and deviation.
         floor: deviation (of luma in [0, 1]) that is added so that flat areas stay flat.
-        scale: size of the view against the picture; `window_px` is of the view.
+        scale: size of the view against the image; `window_px` is of the view.
     """
     grey = linear_to_srgb(linear_rgb @ LUMA)
     if not camera.is_pinhole:
@@ -68,7 +68,7 @@ def make_view(
 
 
 def shrunk(frame: Frame, scale: float, window_px: float, floor: float) -> Frame:
-    """The frame with all pictures resized by `scale` below one; `window_px` of the small ones."""
+    """The frame with all images resized by `scale` below one; `window_px` of the small ones."""
     views = {name: _shrunk(v, scale, window_px, floor) for name, v in frame.views.items()}
     return Frame(frame.number, views, frame.missing)
 
@@ -94,7 +94,7 @@ def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
 
 
 def undistorted(camera: Camera, image: np.ndarray) -> tuple[Camera, np.ndarray]:
-    """The pinhole camera with the same matrix and size, and its picture (borders repeated)."""
+    """The pinhole camera with the same matrix and size, and its image (borders repeated)."""
     k = camera.calibration
     params = (k[0, 0], k[1, 1], k[0, 2], k[1, 2])
     straight = replace(camera, model="PINHOLE", params=tuple(float(p) for p in params))
@@ -114,7 +114,7 @@ def load_frame(
     floor: float,
     scale: float = 1.0,
 ) -> Frame:
-    """Read every camera of a frame; a camera without a readable picture is noted as missing.
+    """Read every camera of a frame; a camera without a readable image is noted as missing.
 
     Raises InputError where fewer than two cameras are left.
     """
@@ -127,7 +127,7 @@ def load_frame(
             continue
         if linear.shape[:2] != (camera.height_px, camera.width_px):
             missing[name] = (
-                f"picture of {linear.shape[1]} x {linear.shape[0]}, "
+                f"image of {linear.shape[1]} x {linear.shape[0]}, "
                 f"camera of {camera.width_px} x {camera.height_px}"
             )
             continue
@@ -137,7 +137,7 @@ def load_frame(
         if len(missing) > 2:
             reasons += f"; and {len(missing) - 2} more"
         raise InputError(
-            f"{len(views)} readable pictures ({reasons})",
+            f"{len(views)} readable images ({reasons})",
             "two or more cameras",
             "Export the frame again or take it out of the take sheet.",
             frame=number,

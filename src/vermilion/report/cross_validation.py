@@ -1,4 +1,4 @@
-"""The cross-validation curve as a picture."""
+"""The cross-validation curve as an image."""
 
 from __future__ import annotations
 

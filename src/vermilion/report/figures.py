@@ -65,7 +65,7 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
 
 
 def bars(table: pd.DataFrame, out: str | Path) -> None:
-    """Table 1 as a picture: mean error of each regressor with its interval, a group a take.
+    """Table 1 as an image: mean error of each regressor with its interval, a group a take.
 
     Variants are shown of all takes together alone.
     """

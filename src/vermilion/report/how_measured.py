@@ -59,7 +59,7 @@ percentile is weighted by the area of the neutral.</p>
 nearest point of the true surface. Gap: lowest point of the upper lip less highest point of the lower, in
 seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
 time, less that of the truth. Moving error: vertex error without each vertex's mean offset over the take's frames in the
-head frame. Contour error: distance of contour points found in the picture to the outer contour of the mesh and to
+head frame. Contour error: distance of contour points found in the image to the outer contour of the mesh and to
 what of its lips hides the mouth there, per inter-ocular distance. Lip penetration: share of frames in which one
 lip lies deeper in the other than <code>evaluation.measures.through_mm</code>. Feature error: RMS of
 regressed against true layer entries.</p>

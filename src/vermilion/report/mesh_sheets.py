@@ -25,7 +25,7 @@ class Column:
     """One column of a sheet.
 
     Attributes:
-        name: over its pictures.
+        name: over its images.
         meshes_mm: (n, V, 3) in the head frame (y up, z out of the face), one a frame.
         triangles: (T, 3) to draw; those with a corner that is NaN in a frame are left out.
         colours: (n, V, 3) in [0, 1].
@@ -43,7 +43,7 @@ def sheet(
     centres_mm: np.ndarray,
     width_mm: float,
     size_px: int,
-    pictures: Sequence[np.ndarray] | None = None,
+    images: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
     """(h, w, 3) uint8: a row a frame and view, a column a mesh.
 
@@ -51,16 +51,16 @@ def sheet(
         frames: numbers of the n frames, for the labels.
         centres_mm: (n, 3) what each frame's views are centred on.
         width_mm: of the part that a view shows.
-        pictures: n pictures (size_px, size_px, 3) uint8 to the left of the front views, or None.
+        images: n images (size_px, size_px, 3) uint8 to the left of the front views, or None.
     """
     rows = []
     for index, frame in enumerate(frames):
         for view, direction in VIEWS:
             camera = view_of(centres_mm[index], np.array(direction), width_mm, size_px)
             cells = []
-            if pictures is not None:
+            if images is not None:
                 paper = np.full((size_px, size_px, 3), 255, np.uint8)
-                cells.append(pictures[index] if view == "front" else paper)
+                cells.append(images[index] if view == "front" else paper)
             for column in columns:
                 text = f"{column.name}, frame {frame}" if view == "front" else ""
                 cells.append(caption(render(column, index, camera), text))
@@ -159,18 +159,18 @@ def view_of(centre_mm: np.ndarray, direction: np.ndarray, width_mm: float, size_
     return pinhole("view", far * size_px / width_mm, size_px, size_px, pose)
 
 
-def caption(picture: np.ndarray, text: str) -> np.ndarray:
+def caption(image: np.ndarray, text: str) -> np.ndarray:
     """Dark text on the white paper of (h, w, 3) uint8."""
     if text:
-        picture = np.ascontiguousarray(picture)
+        image = np.ascontiguousarray(image)
         cv2.putText(
-            picture, text, (8, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA
+            image, text, (8, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA
         )
-    return picture
+    return image
 
 
-def crop(picture: np.ndarray, centre_px: np.ndarray, width_px: float, size_px: int) -> np.ndarray:
-    """The square of a picture (h, w, 3) uint8 round a pixel, (size_px, size_px, 3); white outside."""
+def crop(image: np.ndarray, centre_px: np.ndarray, width_px: float, size_px: int) -> np.ndarray:
+    """The square of an image (h, w, 3) uint8 round a pixel, (size_px, size_px, 3); white outside."""
     scale = size_px / width_px
     matrix = np.array(
         [
@@ -179,7 +179,7 @@ def crop(picture: np.ndarray, centre_px: np.ndarray, width_px: float, size_px: i
         ]
     )
     return cv2.warpAffine(
-        np.ascontiguousarray(picture), matrix, (size_px, size_px), flags=cv2.INTER_LINEAR,
+        np.ascontiguousarray(image), matrix, (size_px, size_px), flags=cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT, borderValue=(255, 255, 255),
     )  # fmt: skip
 

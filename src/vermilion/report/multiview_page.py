@@ -46,11 +46,11 @@ class Findings:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A frame's pictures (h, w, 3) uint8 and why it is shown."""
+    """A frame's images (h, w, 3) uint8 and why it is shown."""
 
     frame: int
     why: str
-    picture: np.ndarray
+    image: np.ndarray
 
 
 def join_frames(
@@ -107,7 +107,7 @@ def report_page(found: Findings, sheets: Sequence[Sheet], page_mb: float) -> str
         [
             ("At a glance", page.figures(_key_figures(found))),
             ("Flagged frames", _flagged(found.frames)),
-            ("Missing pictures", _missing(found)),
+            ("Missing images", _missing(found)),
             ("Over time", body),
             ("Cameras", _cameras(found)),
             ("Frames in every camera", _sheets(sheets, page_mb, len(body))),
@@ -119,7 +119,7 @@ def report_page(found: Findings, sheets: Sequence[Sheet], page_mb: float) -> str
 def _key_figures(found: Findings) -> list[tuple[str, str]]:
     frames, missing = found.frames, _missing_rows(found)
     items = [(str(max(len(frames), 1)), "frames"), (str(len(found.cameras)), "cameras")]
-    items.append((str(len(missing)), "missing pictures"))
+    items.append((str(len(missing)), "missing images"))
     if not len(frames):
         row = found.across[found.across["camera"] == ALL].iloc[0]
         text = "median disagreement of neighbouring cameras on the skin of the neutral"
@@ -196,7 +196,7 @@ def _cameras(found: Findings) -> str:
             "calibration, out of focus or out of step.</p>" + _camera_table(moving)
         )
     body += (
-        "<p>The neutral: each camera's picture carried to its neighbour through the mesh. What is "
+        "<p>The neutral: each camera's image carried to its neighbour through the mesh. What is "
         "left here is an error of the surface, of the calibration, or shading.</p>"
     )
     return body + _camera_table(found.across)
@@ -210,19 +210,19 @@ def _camera_table(rows: pd.DataFrame) -> str:
 def _sheets(sheets: Sequence[Sheet], page_mb: float, used: int) -> str:
     """The sheets as JPEG, made smaller together until the page keeps to its size."""
     room = max(page_mb * 1e6 - used, 1e5) * 3 / 4  # of which base64 makes the page
-    scale, files = 1.0, [page.jpeg(sheet.picture, 82) for sheet in sheets]
+    scale, files = 1.0, [page.jpeg(sheet.image, 82) for sheet in sheets]
     while sum(map(len, files)) > room and scale > 0.1:
         scale *= min(0.9, np.sqrt(room / sum(map(len, files))))
-        files = [page.jpeg(_shrunk(sheet.picture, scale), 78) for sheet in sheets]
+        files = [page.jpeg(_shrunk(sheet.image, scale), 78) for sheet in sheets]
     return "".join(
         f"<h3>Frame {sheet.frame}</h3>" + page.embedded(file, "jpeg", f"{sheet.why}.")
         for sheet, file in zip(sheets, files, strict=True)
     )
 
 
-def _shrunk(picture: np.ndarray, scale: float) -> np.ndarray:
-    size = tuple(max(1, round(n * scale)) for n in (picture.shape[1], picture.shape[0]))
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+def _shrunk(image: np.ndarray, scale: float) -> np.ndarray:
+    size = tuple(max(1, round(n * scale)) for n in (image.shape[1], image.shape[0]))
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
 _CURVES = "Red lines: flagged frames. Dashed lines: anchors. Dotted line: the neutral."
@@ -232,17 +232,17 @@ _HOW = """
 spot of the skin or of the tattoo from frame to frame. Orange: borders of the vermilion and of the mouth.</p>
 <p><b>Points.</b> The frame's own stereo points that the camera sees; red lies outside the mesh, blue
 inside.</p>
-<p><b>Residual.</b> How far this camera's picture would move the mesh: the flow from the neutral's picture,
+<p><b>Residual.</b> How far this camera's image would move the mesh: the flow from the neutral's image,
 carried by the mesh, to the real one. Grey: not measured by this camera.</p>
 <p><b>Cameras that measured.</b> From blue (one) to yellow (all). Grey: no camera; the shape prior alone
 placed the surface there.</p>
-<p><b>Drift.</b> The neutral's picture carried through the mesh, less the real one, both with their local
+<p><b>Drift.</b> The neutral's image carried through the mesh, less the real one, both with their local
 contrast brought to one. Difference: mean absolute, in local deviations; 0 is the same texture, about 1.1
 unrelated texture; fine noise alone gives some tenths. Drift in px and mm: length of the flow that is left,
-median over the vertices and cameras that measured it, in pixels of the original pictures and across the
+median over the vertices and cameras that measured it, in pixels of the original images and across the
 line of sight. Plain skin has little texture, so its flow is noisier than that of the tattoo. A drift that
 grows with the distance from the neutral is a slip; one that stays is noise, exposure or calibration.
 Every frame and camera is in <code>drift.tsv</code>.</p>
-<p><b>The neutral's sheet</b> carries the picture of the neighbouring camera instead: it shows the error of
+<p><b>The neutral's sheet</b> carries the image of the neighbouring camera instead: it shows the error of
 the surface.</p>
 """

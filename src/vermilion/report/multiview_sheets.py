@@ -1,4 +1,4 @@
-"""One frame in every camera: picture, mesh, stereo points, residual, visibility, drift."""
+"""One frame in every camera: image, mesh, stereo points, residual, visibility, drift."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DIFFERENCE = 1.5
 class SheetSettings:
     """See `vermilion.config.multiview` for meanings and units; `scale` is that of the drift."""
 
-    picture_px: int
+    image_px: int
     residual_px: float
     cloud_mm: float
     scale: float
@@ -43,11 +43,11 @@ class Shown:
     """A frame to draw.
 
     Attributes:
-        frame: full-size pictures.
+        frame: full-size images.
         vertices_mm: (V, 3).
         cameras_seeing: (V,) cameras that measured the vertex; zero where the prior placed it.
         cloud: stereo points.
-        carried: camera -> another picture carried through the mesh.
+        carried: camera -> another image carried through the mesh.
     """
 
     frame: Frame
@@ -58,9 +58,9 @@ class Shown:
 
 
 def columns(settings: SheetSettings, carried_from: str) -> list[str]:
-    """What the pictures of a row show, from left to right."""
+    """What the images of a row show, from left to right."""
     return [
-        "picture",
+        "image",
         f"mesh, {GRID_MM:g} mm grid",
         f"points, -{settings.cloud_mm:g} to {settings.cloud_mm:g} mm",
         f"residual, 0 to {settings.residual_px:g} px",
@@ -77,15 +77,15 @@ def frame_sheet(
     mesh = _Mesh.of(shown, model)
     names = sorted({*shown.frame.views, *shown.frame.missing})
     headings = columns(settings, carried_from)
-    rows = [np.hstack([_heading(text, settings.picture_px) for text in headings])]
+    rows = [np.hstack([_heading(text, settings.image_px) for text in headings])]
     for name in names:
         if name in shown.frame.views:
             cells = _row(mesh, shown, name, settings)
             cells[0] = write_label(cells[0], name)
         else:
-            cells = [_heading(name, settings.picture_px), _heading("no picture", 0)]
-            cells += [_heading("", settings.picture_px)] * (len(headings) - len(cells))
-        rows.append(np.hstack([_boxed(cell, settings.picture_px) for cell in cells]))
+            cells = [_heading(name, settings.image_px), _heading("no image", 0)]
+            cells += [_heading("", settings.image_px)] * (len(headings) - len(cells))
+        rows.append(np.hstack([_boxed(cell, settings.image_px) for cell in cells]))
     return np.vstack(rows)
 
 
@@ -113,9 +113,9 @@ class _Mesh:
 
 def _row(mesh: _Mesh, shown: Shown, name: str, settings: SheetSettings) -> list[np.ndarray]:
     view, carried = shown.frame.views[name], shown.carried.get(name)
-    camera, picture = _window(view, carried, settings)
+    camera, image = _window(view, carried, settings)
     hits = mesh.caster.see(camera)
-    dim = picture // 3
+    dim = image // 3
 
     def coloured(values: np.ndarray, low: float, high: float, name: str) -> np.ndarray:
         colours = colour_map(values, low, high, name)
@@ -124,8 +124,8 @@ def _row(mesh: _Mesh, shown: Shown, name: str, settings: SheetSettings) -> list[
     seeing = shown.cameras_seeing.astype(float)
     seeing = np.where(seeing > 0, seeing, np.nan)
     cells = [
-        picture,
-        _mesh_over(picture, camera, hits, mesh),
+        image,
+        _mesh_over(image, camera, hits, mesh),
         _points_over(dim, camera, mesh, shown.cloud, settings.cloud_mm),
         coloured(_residual(mesh, carried, settings), 0, settings.residual_px, "turbo"),
         coloured(seeing, 0, max(len(shown.frame.views), 2), "viridis"),
@@ -143,7 +143,7 @@ def _row(mesh: _Mesh, shown: Shown, name: str, settings: SheetSettings) -> list[
 def _window(
     view: View, carried: Carried | None, settings: SheetSettings
 ) -> tuple[Camera, np.ndarray]:
-    """The part of a picture where the mesh is, at the sheet's size: its camera and pixels."""
+    """The part of an image where the mesh is, at the sheet's size: its camera and pixels."""
     left, top, right, bottom = 0, 0, view.camera.width_px, view.camera.height_px
     if carried is not None and carried.comparison is not None:
         raster = carried.comparison.raster
@@ -157,18 +157,18 @@ def _window(
     params = (k[0, 0], k[1, 1], k[0, 2] - left, k[1, 2] - top)
     width, height = int(right - left), int(bottom - top)
     cut = Camera(view.camera.name, "PINHOLE", params, width, height, view.camera.cam_from_world)
-    camera = cut.resized(min(1.0, settings.picture_px / max(width, height)))
+    camera = cut.resized(min(1.0, settings.image_px / max(width, height)))
     return camera, _resized(show(view)[top:bottom, left:right], camera)
 
 
-def _mesh_over(picture: np.ndarray, camera: Camera, hits: Hits, mesh: _Mesh) -> np.ndarray:
+def _mesh_over(image: np.ndarray, camera: Camera, hits: Hits, mesh: _Mesh) -> np.ndarray:
     """Lines of a grid that the mesh carries, and the borders of the vermilion and the mouth."""
     place = interpolate(hits, mesh.model.triangles, mesh.model.neutral_mm[:, :2])
     square = np.where(hits.hit[..., None], np.floor(place / GRID_MM), np.nan)
     edge = np.zeros(hits.hit.shape, dtype=bool)
     edge[1:] |= (np.abs(np.diff(square, axis=0)) > 0).any(axis=2)
     edge[:, 1:] |= (np.abs(np.diff(square, axis=1)) > 0).any(axis=2)
-    tinted = np.where(edge[..., None], 0.45 * picture + 0.55 * np.array([90, 255, 140]), picture)
+    tinted = np.where(edge[..., None], 0.45 * image + 0.55 * np.array([90, 255, 140]), image)
     drawn = np.ascontiguousarray(np.rint(tinted).astype(np.uint8))
     for loop in (mesh.model.outer_contour, mesh.model.inner_contour):
         points = mesh.vertices_mm[loop]
@@ -181,11 +181,11 @@ def _mesh_over(picture: np.ndarray, camera: Camera, hits: Hits, mesh: _Mesh) -> 
 
 
 def _points_over(
-    picture: np.ndarray, camera: Camera, mesh: _Mesh, cloud: Cloud, scale_mm: float
+    image: np.ndarray, camera: Camera, mesh: _Mesh, cloud: Cloud, scale_mm: float
 ) -> np.ndarray:
     """Points that the camera sees, coloured by their mean height over the mesh (red: outside)."""
     if not len(cloud):
-        return picture
+        return image
     pixels = camera.project(cloud.points_mm)
     seen = mesh.caster.visible(camera, cloud.points_mm, 2.0) & camera.in_image(pixels, 1.0)
     column, row = np.floor(pixels[seen]).astype(int).T
@@ -196,7 +196,7 @@ def _points_over(
     count, total = (cv2.blur(part.astype(float), (2, 2)) for part in (count, total))  # larger dots
     height = total / np.maximum(count, 1e-9)
     colours = 255 * colour_map(height, -scale_mm, scale_mm, "coolwarm")
-    return np.where(count[..., None] > 1e-9, np.rint(colours), picture).astype(np.uint8)
+    return np.where(count[..., None] > 1e-9, np.rint(colours), image).astype(np.uint8)
 
 
 def _residual(mesh: _Mesh, carried: Carried | None, settings: SheetSettings) -> np.ndarray:
@@ -207,10 +207,10 @@ def _residual(mesh: _Mesh, carried: Carried | None, settings: SheetSettings) -> 
     return np.where(carried.seen & (carried.motion.weight > 0), length, np.nan)
 
 
-def _resized(picture: np.ndarray, camera: Camera) -> np.ndarray:
+def _resized(image: np.ndarray, camera: Camera) -> np.ndarray:
     size = (camera.width_px, camera.height_px)
-    method = cv2.INTER_AREA if size[0] < picture.shape[1] else cv2.INTER_LINEAR
-    return cv2.resize(picture, size, interpolation=method)
+    method = cv2.INTER_AREA if size[0] < image.shape[1] else cv2.INTER_LINEAR
+    return cv2.resize(image, size, interpolation=method)
 
 
 def _dark(camera: Camera) -> np.ndarray:
@@ -218,11 +218,11 @@ def _dark(camera: Camera) -> np.ndarray:
 
 
 def _heading(text: str, size_px: int) -> np.ndarray:
-    """A low dark picture with a text."""
+    """A low dark image with a text."""
     return write_label(np.full((30, max(size_px, 60), 3), _DARK, dtype=np.uint8), text)
 
 
-def _boxed(picture: np.ndarray, width_px: int) -> np.ndarray:
-    """In the middle of a dark column; rows of a sheet are as high as their highest picture."""
-    room = width_px - picture.shape[1]
-    return np.pad(picture, ((1, 1), (room // 2, room - room // 2), (0, 0)), constant_values=_DARK)
+def _boxed(image: np.ndarray, width_px: int) -> np.ndarray:
+    """In the middle of a dark column; rows of a sheet are as high as their highest image."""
+    room = width_px - image.shape[1]
+    return np.pad(image, ((1, 1), (room // 2, room - room // 2), (0, 0)), constant_values=_DARK)

@@ -19,7 +19,7 @@ from vermilion.multiview.drift import (
 )
 from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import Pictures, RefineSettings, frame_cloud
+from vermilion.multiview.take import MultiviewImages, RefineSettings, frame_cloud
 from vermilion.multiview.views import Frame
 from vermilion.report.multiview_page import Sheet
 from vermilion.report.multiview_sheets import SheetSettings, Shown, frame_sheet
@@ -34,7 +34,7 @@ class TakeSheets:
         neutral_mm: (V, 3).
     """
 
-    pictures: Pictures
+    images: MultiviewImages
     model: FaceModel
     neutral_frame: int
     neutral_mm: np.ndarray
@@ -46,16 +46,16 @@ class TakeSheets:
 
     @cached_property
     def _neutral(self) -> Frame:
-        return self.pictures.load(self.neutral_frame)
+        return self.images.load(self.neutral_frame)
 
     @cached_property
     def _origin(self) -> Origin:
-        frame = self.pictures.at(self._neutral, self.drift.scale)
+        frame = self.images.at(self._neutral, self.drift.scale)
         return Origin.of(frame, self.neutral_mm, self.model)
 
     @cached_property
     def _across(self) -> dict[str, Carried]:
-        """The neutral's pictures, each carried to the neighbouring camera."""
+        """The neutral's images, each carried to the neighbouring camera."""
         frame = self._origin.frame
         sources = neighbours(frame, self.neutral_mm.mean(axis=0))
         return carry(self._origin, frame, self.neutral_mm, self.matcher, self.drift, sources)
@@ -78,9 +78,9 @@ class TakeSheets:
             seeing, source = np.sum(seen, axis=0), "neighbour"
         else:
             vertices, source = np.asarray(mesh_mm, dtype=np.float64), "neutral"
-            frame = self.pictures.load(number)
-            small = self.pictures.at(frame, self.drift.scale)
+            frame = self.images.load(number)
+            small = self.images.at(frame, self.drift.scale)
             carried = carry(self._origin, small, vertices, self.matcher, self.drift)
-        cloud = frame_cloud(self.pictures, frame, vertices, self.model, self.stereo, self.refine)
+        cloud = frame_cloud(self.images, frame, vertices, self.model, self.stereo, self.refine)
         shown = Shown(frame, vertices, np.asarray(seeing), cloud, carried)
         return Sheet(number, why, frame_sheet(shown, self.model, self.sheet, source))

@@ -116,7 +116,7 @@ def figures(items: Sequence[tuple[str, str]]) -> str:
     return f'<div class="figures">{boxes}</div>' if items else ""
 
 
-def picture(path: str | Path, caption: str, width_px: int = 1400) -> str:
+def image(path: str | Path, caption: str, width_px: int = 1400) -> str:
     """A PNG or JPEG, embedded; large ones as JPEG of at most `width_px`."""
     path = Path(path)
     content = path.read_bytes()
@@ -136,7 +136,7 @@ def jpeg(pixels: np.ndarray, quality: int) -> bytes:
 
 
 def embedded(content: bytes, kind: str, caption: str) -> str:
-    """The bytes of a picture file (`kind` png or jpeg) as a figure."""
+    """The bytes of an image file (`kind` png or jpeg) as a figure."""
     encoded = base64.b64encode(content).decode("ascii")
     return (
         f'<figure><img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'

@@ -22,7 +22,7 @@ _STAGES = (
 
 @dataclass(frozen=True)
 class Overlay:
-    """A picture of a stage: stage, `subject/take` (or what it shows), file."""
+    """An image of a stage: stage, `subject/take` (or what it shows), file."""
 
     stage: str
     what: str
@@ -36,10 +36,10 @@ class Findings:
     Attributes:
         measures, table1, kinds, flagged: tables.
         comparisons, table2, table3, estimators: tables; configured: the estimator of the configuration.
-        table1_picture, figure16: files.
-        renders, stretch, error_maps, over_time, curve_pictures: (name, file) pairs.
+        table1_image, figure16: files.
+        renders, stretch, error_maps, over_time, curve_images: (name, file) pairs.
         reconstructions: (name, link) pairs, pages on H of a take.
-        overlays: pictures of the stages.
+        overlays: images of the stages.
         videos, timelines: (name, file) pairs of the corrected takes.
         frames, regressors: tables of `how_measured`.
         settings: (what, value) pairs for "How this was measured".
@@ -54,13 +54,13 @@ class Findings:
     table3: pd.DataFrame
     estimators: pd.DataFrame
     configured: str
-    table1_picture: Path
+    table1_image: Path
     figure16: Path
     renders: Sequence[tuple[str, Path]]
     stretch: Sequence[tuple[str, Path]]
     error_maps: Sequence[tuple[str, Path]]
     over_time: Sequence[tuple[str, Path]]
-    curve_pictures: Sequence[tuple[str, Path]]
+    curve_images: Sequence[tuple[str, Path]]
     overlays: Sequence[Overlay]
     videos: Sequence[tuple[str, Path]]
     timelines: Sequence[tuple[str, Path]]
@@ -84,18 +84,18 @@ def summary_page(found: Findings, embed_video_mb: float) -> str:
             ("Table 1: tracking error", _table1(found)),
             ("Tables 2 and 3: influence of the features", study.features(found.table2, found.table3)),
             ("RBF network, affine map, kernel regression", study.strategies(found.estimators)
-             + page.picture(found.figure16, _FIGURE16_CAPTION)),
+             + page.image(found.figure16, _FIGURE16_CAPTION)),
             ("Corrected takes", _videos(found, embed_video_mb)),
-            ("Renders", _pictures(found.renders, _RENDER_CAPTION)),
-            ("Surface stretch", _pictures(found.stretch, _STRETCH_CAPTION)),
-            ("Error maps", _pictures(found.error_maps, _MAP_CAPTION)),
-            ("Over time", _pictures(found.over_time, "{}: held-out frames.")),
+            ("Renders", _images(found.renders, _RENDER_CAPTION)),
+            ("Surface stretch", _images(found.stretch, _STRETCH_CAPTION)),
+            ("Error maps", _images(found.error_maps, _MAP_CAPTION)),
+            ("Over time", _images(found.over_time, "{}: held-out frames.")),
             ("Kinds of mouth shapes", study.kinds(found.kinds)),
             ("Further measures", _further(found.measures)),
             ("Accuracy of H", _reconstruction(found)),
-            ("Training", _pictures(found.curve_pictures, "{}: cross-validation error.")),
+            ("Training", _images(found.curve_images, "{}: cross-validation error.")),
             ("Flagged frames", _flagged(found)),
-            ("Pictures of every stage", _stages(found.overlays)),
+            ("Images of every stage", _stages(found.overlays)),
             ("How this was measured", how_measured(found.frames, found.regressors, found.settings)),
         ],
     )  # fmt: skip
@@ -106,7 +106,7 @@ _TIMELINE_CAPTION = (
     "is listed below as outside the training's span; grey frames were not corrected."
 )
 _RENDER_CAPTION = (
-    "{}: held-out frames with the largest error of the base track, from front and side: the picture, "
+    "{}: held-out frames with the largest error of the base track, from front and side: the image, "
     "every regressor, the truth (Lips16 figures 10, 12, 13)."
 )
 _STRETCH_CAPTION = (
@@ -160,7 +160,7 @@ def _table1(found: Findings) -> str:
     tables = page.table(own, headings, "where")
     if len(own) < len(rows):
         tables += page.folded("With all variants", page.table(rows, headings, "where"))
-    return tables + page.picture(found.table1_picture, caption)
+    return tables + page.image(found.table1_image, caption)
 
 
 def _further(measures: pd.DataFrame) -> str:
@@ -186,8 +186,8 @@ _NEVER_CLOSED = (
 )
 
 
-def _pictures(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
-    return "".join(page.picture(path, caption.format(name)) for name, path in pairs)
+def _images(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
+    return "".join(page.image(path, caption.format(name)) for name, path in pairs)
 
 
 def _reconstruction(found: Findings) -> str:
@@ -215,7 +215,7 @@ def _videos(found: Findings, limit_mb: float) -> str:
         page.video(path, caption.format(name), limit_mb) for name, path in found.videos
     )
     return videos + "".join(
-        page.picture(path, _TIMELINE_CAPTION.format(name)) for name, path in found.timelines
+        page.image(path, _TIMELINE_CAPTION.format(name)) for name, path in found.timelines
     )
 
 
@@ -239,8 +239,8 @@ def _stages(overlays: Sequence[Overlay]) -> str:
     body = ""
     for stage in sorted({o.stage for o in overlays}, key=_rank):
         of_stage = [o for o in overlays if o.stage == stage]
-        pictures = "".join(page.picture(o.path, o.what) for o in of_stage)
-        body += page.folded(f"{stage} ({len(of_stage)})", pictures)
+        images = "".join(page.image(o.path, o.what) for o in of_stage)
+        body += page.folded(f"{stage} ({len(of_stage)})", images)
     return body
 
 

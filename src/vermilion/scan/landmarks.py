@@ -52,7 +52,7 @@ def find_landmarks(
 
     Args:
         scan: in any unit and frame.
-        detector: works on pictures.
+        detector: works on images.
         generic: (66, 3) mm landmarks of the face model's neutral, which say what is front and up.
 
     Raises:

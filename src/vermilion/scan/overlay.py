@@ -1,4 +1,4 @@
-"""Pictures of a personal model, to be looked at once a scan."""
+"""Images of a personal model, to be looked at once a scan."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a scan, and the landmarks that a detector finds in them, put back on its surface."""
+"""Images of a scan, and the landmarks that a detector finds in them, put back on its surface."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ScanViews:
             self, "_normals", vertex_normals(self.mesh.vertices_mm, self.mesh.triangles)
         )
 
-    def picture(self, camera: Camera) -> np.ndarray:
+    def image(self, camera: Camera) -> np.ndarray:
         """The bare surface in a lamp above the camera, (h, w, 3) linear in [0, 1].
 
         Colours of the scan are not used: lips and brows have enough shape, and paint or shadow
@@ -55,7 +55,7 @@ class ScanViews:
 
     def landmarks(self, camera: Camera, detector: LandmarkDetector) -> tuple[Landmarks, np.ndarray]:
         """What the detector finds in one view, and its points (66, 3) on the surface, NaN elsewhere."""
-        found = detector.detect(self.picture(camera))
+        found = detector.detect(self.image(camera))
         if not found.found:
             return found, np.full((N_LANDMARKS, 3), np.nan)
         return found, self.on_surface(camera, found.points_px)
@@ -64,7 +64,7 @@ class ScanViews:
 def camera_towards(
     middle: np.ndarray, size: float, front: np.ndarray, up: np.ndarray, size_px: int
 ) -> Camera:
-    """A camera in front of `middle` whose picture is `size` wide there; `front`, `up` are axes."""
+    """A camera in front of `middle` whose image is `size` wide there; `front`, `up` are axes."""
     distance = 4.0 * size
     pose = look_at(np.asarray(middle) + distance * normalised(front), middle, up)
     return pinhole("scan", size_px * distance / size, size_px, size_px, pose)

@@ -1,1 +1,1 @@
-"""Synthetic captures: actors, performances, a rig, light and pictures."""
+"""Synthetic captures: actors, performances, a rig, light and images."""

@@ -1,4 +1,4 @@
-"""Writing a synthetic take: pictures, cameras, labels, and the truth apart."""
+"""Writing a synthetic take: images, cameras, labels, and the truth apart."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from vermilion.studio.surface import surface_of
 from vermilion.studio.take import StudioTakePlan
 
 
-def picture_path(capture: str | Path, camera: str, frame: int) -> Path:
-    """Where a capture folder has a picture."""
+def image_path(capture: str | Path, camera: str, frame: int) -> Path:
+    """Where a capture folder has an image."""
     return Path(capture) / "frames" / camera / f"{frame:06d}.png"
 
 
@@ -29,7 +29,7 @@ def label_path(capture: str | Path, kind: str, camera: str, frame: int) -> Path:
     return Path(capture) / "labels" / kind / camera / f"{frame:06d}.json"
 
 
-def write_pictures(
+def write_images(
     plan: StudioTakePlan,
     cameras: dict[str, Camera],
     capture: str | Path,
@@ -49,11 +49,11 @@ def write_pictures(
     surface = surface_of(plan.model)
     for frame in progress(list(frames), f"{name}: frames"):
         index = frame - first
-        pictures = render(plan.stage(index, surface, **rays), plan.vertices_mm(index), cameras)
-        for camera, picture in pictures.items():
+        images = render(plan.stage(index, surface, **rays), plan.vertices_mm(index), cameras)
+        for camera, image in images.items():
             place = f"{name}/{camera}"
-            noisy = sensor_noise(picture, noise_read, noise_shot, seed, place, frame)
-            write_image(picture_path(capture, camera, frame), noisy)
+            noisy = sensor_noise(image, noise_read, noise_shot, seed, place, frame)
+            write_image(image_path(capture, camera, frame), noisy)
 
 
 def write_labels(

@@ -37,7 +37,7 @@ class MouthView:
     corner_px: np.ndarray
 
     def to_pixels(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Places in the crop (cell corners are whole numbers) to picture pixels (N, 2)."""
+        """Places in the crop (cell corners are whole numbers) to image pixels (N, 2)."""
         return np.stack([columns, rows], axis=-1) / SUBPIXELS + self.corner_px
 
 

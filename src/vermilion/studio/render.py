@@ -1,4 +1,4 @@
-"""Pictures of a head by ray casting: many cameras share one scene and one baking of the light."""
+"""Images of a head by ray casting: many cameras share one scene and one baking of the light."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class _View:
 
 
 def render(stage: Stage, vertices_mm: np.ndarray, cameras: dict[str, Camera]) -> dict:
-    """Linear RGB pictures, name -> (h, w, 3) float32, of the head at `vertices_mm` (V, 3).
+    """Linear RGB images, name -> (h, w, 3) float32, of the head at `vertices_mm` (V, 3).
 
-    The shading holds no randomness, and no camera's picture depends on the others.
+    The shading holds no randomness, and no camera's image depends on the others.
     """
     vertices = np.ascontiguousarray(vertices_mm, dtype=np.float64)
     caster = RayCaster(vertices, stage.triangles)
@@ -70,7 +70,7 @@ def render(stage: Stage, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
         stage.n_directions,
         stage.n_points,
     )
-    return {name: _picture(stage, view, normals, light) for name, view in views.items()}
+    return {name: _image(stage, view, normals, light) for name, view in views.items()}
 
 
 def _look_through(stage: Stage, caster: RayCaster, normals: np.ndarray, camera: Camera) -> _View:
@@ -89,14 +89,14 @@ def _look_through(stage: Stage, caster: RayCaster, normals: np.ndarray, camera: 
     return _View(directions.shape[:2], directions, hits, edge, extra, extra_hits, 1.0 / scale)
 
 
-def _picture(stage: Stage, view: _View, normals: np.ndarray, light) -> np.ndarray:
-    picture = _shaded(stage, view.directions, view.hits, normals, light, view.pixel_angle)
+def _image(stage: Stage, view: _View, normals: np.ndarray, light) -> np.ndarray:
+    image = _shaded(stage, view.directions, view.hits, normals, light, view.pixel_angle)
     if view.edge.any():
         samples = _shaded(
             stage, view.edge_directions, view.edge_hits, normals, light, view.pixel_angle
         )
-        picture[view.edge] = samples.mean(axis=0)
-    return picture
+        image[view.edge] = samples.mean(axis=0)
+    return image
 
 
 def _shaded(stage: Stage, directions, hits: Hits, normals, light, pixel_angle) -> np.ndarray:

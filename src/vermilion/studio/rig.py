@@ -52,7 +52,7 @@ def lips16_rig(
 ) -> dict[str, Camera]:
     """Ten cameras aimed at the actor whose neutral (V, 3) is given; its head frame is the world.
 
-    The views are heights that a picture covers at the face and at the lips.
+    The views are heights that an image covers at the face and at the lips.
     """
     lips = lips_centre(model, neutral_mm)
     face = face_centre(model, neutral_mm)

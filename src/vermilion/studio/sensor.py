@@ -8,14 +8,14 @@ import numpy as np
 
 
 def sensor_noise(
-    picture: np.ndarray, read: float, shot: float, seed: int, name: str, frame: int
+    image: np.ndarray, read: float, shot: float, seed: int, name: str, frame: int
 ) -> np.ndarray:
-    """The picture (h, w, 3), linear, with noise of variance `read`**2 + `shot` * value.
+    """The image (h, w, 3), linear, with noise of variance `read`**2 + `shot` * value.
 
     The noise depends on the seed, the name (subject, take, camera) and the frame alone, so that
     chunks and the order of jobs change nothing.
     """
     rng = np.random.default_rng([seed, zlib.crc32(name.encode()), frame])
-    deviation = np.sqrt(read**2 + shot * np.maximum(picture, 0.0), dtype=np.float32)
-    noise = rng.standard_normal(picture.shape, dtype=np.float32)
-    return np.clip(picture + deviation * noise, 0.0, 1.0)
+    deviation = np.sqrt(read**2 + shot * np.maximum(image, 0.0), dtype=np.float32)
+    noise = rng.standard_normal(image.shape, dtype=np.float32)
+    return np.clip(image + deviation * noise, 0.0, 1.0)

@@ -29,7 +29,7 @@ FREE_TURN_DEG = (24.0, 11.0, 7.0)
 
 @dataclass(frozen=True)
 class StudioTakePlan:
-    """Everything that decides the pictures of a take except its cameras and its noise.
+    """Everything that decides the images of a take except its cameras and its noise.
 
     Attributes:
         identities: (F, I) coefficients of each frame's person.

@@ -1,6 +1,6 @@
 """Coarse mesh sequences of other trackers: a folder of OBJ or PLY, an `.npz`, or USD.
 
-A take with role `tracked` brings such a sequence instead of pictures.
+A take with role `tracked` brings such a sequence instead of images.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The medium-scale corrective layer outside the model's space (Lips16 3.2).
 
-Offsets of the vertices parallel to the picture, where the picture tells something of them, by
+Offsets of the vertices parallel to the image, where the image tells something of them, by
 Gauss-Newton on
 
-    strength / 2 * mean over visible samples of rho(|display(picture) - display(albedo * SH(normal))|)
+    strength / 2 * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + 1 / (2 sigma^2 length^2) * integral of |d|^2 + length^4 |Laplacian d|^2
 
 over the surface: d is a smooth random field of deviation `sigma_mm`, alike over `length_mm`.
@@ -36,7 +36,7 @@ class LayerSettings:
     Attributes:
         sigma_mm: deviation of the offsets.
         length_mm: over which they are alike.
-        sigma, robust_sigmas, strength: of the picture, as in `PhotometricSettings`.
+        sigma, robust_sigmas, strength: of the image, as in `PhotometricSettings`.
         iterations: Gauss-Newton steps at each resolution, coarsest first; 0 skips one.
     """
 
@@ -87,7 +87,7 @@ class CorrectiveLayer:
         return across @ rotation[:2]
 
     def _step(self, view, level, at, points, predicted, trust, across):
-        """The offsets (V, 2), parallel to the picture, that minimise the energy's quadratic."""
+        """The offsets (V, 2), parallel to the image, that minimise the energy's quadratic."""
         s = self.settings
         found, slopes, inside = view.levels[level].sample(project(points, view.focal_px))
         error = to_display_values(found) - predicted

@@ -1,4 +1,4 @@
-"""The tracked model over the pictures."""
+"""The tracked model over the images."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _SIDE_PX = 480
 
 
 def draw_tracked(
-    picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
+    image: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
 ) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with the mesh, half transparent, and its two lip contours."""
     if not camera.is_pinhole:
-        return _draw_outline(picture, camera, vertices_mm, model)
-    drawn = draw_mesh(picture, camera, vertices_mm, model.triangles, opacity=0.5)
+        return _draw_outline(image, camera, vertices_mm, model)
+    drawn = draw_mesh(image, camera, vertices_mm, model.triangles, opacity=0.5)
     return _draw_outline(drawn, camera, vertices_mm, model)
 
 
-def _draw_outline(picture, camera, vertices_mm, model):
+def _draw_outline(image, camera, vertices_mm, model):
     for loop in (model.outer_contour, model.inner_contour):
-        picture = draw_polyline(picture, camera.project(vertices_mm[loop]), (255, 40, 40))
-    return picture
+        image = draw_polyline(image, camera.project(vertices_mm[loop]), (255, 40, 40))
+    return image
 
 
 def tracking_overlay(
@@ -55,27 +55,27 @@ def tracking_overlay(
     Returns:
         (h, w, 3) uint8.
     """
-    pictures = []
+    images = []
     rows = {int(frame): row for row, frame in enumerate(landmarks.frames)}
     for index in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)):
         frame = int(frames[index])
         try:
-            picture = to_display(source.read(camera.name, frame))
+            image = to_display(source.read(camera.name, frame))
         except InputError:
-            picture = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
-        drawn = draw_tracked(picture, camera, vertices_mm[index], model)
+            image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+        drawn = draw_tracked(image, camera, vertices_mm[index], model)
         if frame in rows:
             drawn = draw_points(drawn, landmarks.points_px[rows[frame]], (0, 255, 0), 1)
         crop = cut_to(drawn, camera.project(vertices_mm[index]))
-        pictures.append(label(crop, f"{frame}" if valid[index] else f"{frame}: not tracked"))
-    return tile(pictures, columns)
+        images.append(label(crop, f"{frame}" if valid[index] else f"{frame}: not tracked"))
+    return tile(images, columns)
 
 
-def cut_to(picture: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
-    """The square round points, resized to 480 x 480; black outside the picture."""
+def cut_to(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
+    """The square round points, resized to 480 x 480; black outside the image."""
     low, high = np.nanmin(points_px, axis=0), np.nanmax(points_px, axis=0)
     half = 0.5 * (1 + 2 * margin) * max(float((high - low).max()), 8.0)
     corner = 0.5 * (low + high) - half
     scale = _SIDE_PX / (2 * half)
     affine = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale]])
-    return cv2.warpAffine(picture, affine, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_AREA)
+    return cv2.warpAffine(image, affine, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_AREA)

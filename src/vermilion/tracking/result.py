@@ -80,7 +80,7 @@ class TrackedTake:
         valid: (F,) bool; poses and weights of the others are interpolated.
         reprojection_px: (F,) RMS over the landmarks but the jaw's; NaN where none were found.
         camera_name, camera_model, camera_params, camera_size_px, cam_from_world: the camera of the
-            pictures, with the focal length that was used.
+            images, with the focal length that was used.
     """
 
     frames: np.ndarray
@@ -125,7 +125,7 @@ class TrackedTake:
 
     @property
     def camera(self) -> Camera:
-        """The camera of the pictures."""
+        """The camera of the images."""
         width, height = (int(n) for n in self.camera_size_px)
         params = tuple(float(p) for p in self.camera_params)
         return Camera(

@@ -18,7 +18,7 @@ from tests.stages.test_correction import (
     run_train,
 )
 from vermilion.config.apply import OverlayConfig
-from vermilion.config.correction import PictureConfig
+from vermilion.config.correction import ImageAgreementConfig
 from vermilion.config.evaluation import (
     ContourConfig,
     EvaluationConfig,
@@ -39,7 +39,7 @@ CFG = {
     "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
     "evaluation.figures.map_frames": 2,
     "correction.integration": {"seam_mm": 8.0, "detail_mm": 15.0},
-    "correction.picture": PictureConfig().model_dump(),
+    "correction.image": ImageAgreementConfig().model_dump(),
     "apply.overlay": OverlayConfig(panel_height_px=160).model_dump(),
     "apply.export": {"obj": True, "usd": True},
 }
@@ -76,7 +76,7 @@ def write_truth(folder, truth, triangles):
 
 
 def add_contours(path):
-    """Contours that were not found: the scene has no pictures."""
+    """Contours that were not found: the scene has no images."""
     arrays = load_arrays(path)
     nothing = np.full((len(arrays["frames"]), 8, 2), np.nan)
     found = np.zeros(nothing.shape[:2], dtype=bool)

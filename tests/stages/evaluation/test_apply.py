@@ -19,7 +19,7 @@ from vermilion.storage.tables import read_table
 pytestmark = pytest.mark.slow
 
 
-def apply_chunk(scene, frames, pictures, out):
+def apply_chunk(scene, frames, images, out):
     """Correct some frames as one chunk."""
     take = scene.root / f"takes/{SUBJECT}/rom"
     first, last = frames[0], frames[-1]
@@ -28,7 +28,7 @@ def apply_chunk(scene, frames, pictures, out):
         "apply/apply",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={
-            "cfg": CFG, "frames": list(frames), "fps": 25.0, "source": str(pictures), "camera": "face2"
+            "cfg": CFG, "frames": list(frames), "fps": 25.0, "source": str(images), "camera": "face2"
         },
         input={
             "tracker": scene.root / "face/tracker.npz",
@@ -48,13 +48,13 @@ def apply_chunk(scene, frames, pictures, out):
 
 
 def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path):
-    pictures = tmp_path / "pictures"
+    images = tmp_path / "images"
     for frame in range(12):
-        if frame != 7:  # a picture that is missing does not stop the take
-            write_srgb8(pictures / f"{frame:06d}.png", np.full((400, 320, 3), 100, np.uint8))
-    whole = apply_chunk(scene, range(12), pictures, tmp_path / "whole")
+        if frame != 7:  # an image that is missing does not stop the take
+            write_srgb8(images / f"{frame:06d}.png", np.full((400, 320, 3), 100, np.uint8))
+    whole = apply_chunk(scene, range(12), images, tmp_path / "whole")
     parts = [
-        apply_chunk(scene, part, pictures, tmp_path / "parts") for part in (range(5), range(5, 12))
+        apply_chunk(scene, part, images, tmp_path / "parts") for part in (range(5), range(5, 12))
     ]
     at_once = read_sequence(tmp_path / f"whole/{whole}.npy")
     in_parts = read_sequence([tmp_path / f"parts/{part}.npy" for part in parts])

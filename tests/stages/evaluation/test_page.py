@@ -21,9 +21,9 @@ pytestmark = pytest.mark.slow
 TOGETHER = {
     "measures": "measures.tsv", "seconds": "seconds.tsv", "kinds": "kinds.tsv", "table1": "table1.tsv", "table2": "table2.tsv",
     "table3": "table3.tsv", "comparisons": "comparisons.tsv", "estimators": "estimators.tsv",
-    "picture": "table1.png", "figure16": "figure16.png",
+    "image": "table1.png", "figure16": "figure16.png",
 }  # fmt: skip
-#: Pictures of a take.
+#: Images of a take.
 SHEETS = {
     "maps": "error_maps.png", "renders": "renders.png", "stretch": "stretch.png",
     "curves": "curves.png",
@@ -32,7 +32,7 @@ SHEETS = {
 
 @pytest.fixture(scope="module")
 def tables(scene):
-    """The evaluation folder with all tables and pictures but the page."""
+    """The evaluation folder with all tables and images but the page."""
     root, out = scene.root, reconstruction(scene)
     ev = root / "evaluation"
     run_script(
@@ -101,9 +101,9 @@ def test_sheets_have_a_column_a_mesh(tables):
     # base, contour, oracle; PS, MS, GR, and told the neutral; truth
     columns = {"maps": 9, "renders": 11, "stretch": 10}
     for name, count in columns.items():
-        picture = cv2.imread(str(tables / SHEETS[name]))
-        assert picture.shape[1] == count * size, name
-        assert picture.shape[0] // size == 4
+        image = cv2.imread(str(tables / SHEETS[name]))
+        assert image.shape[1] == count * size, name
+        assert image.shape[0] // size == 4
 
 
 def test_page_is_whole_and_needs_no_network(scene, tables):

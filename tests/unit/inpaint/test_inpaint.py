@@ -168,16 +168,16 @@ def test_bare_skin_keeps_its_distance(domain, opacity):
 
 def test_pixels_without_paint_keep_their_bits():
     rng = np.random.default_rng(0)
-    picture = rng.random((30, 40, 3)).astype(np.float32)
+    image = rng.random((30, 40, 3)).astype(np.float32)
     opacity = np.zeros((12, 16), np.float32)
     opacity[5:8, 5:8] = 1.0
     opened = np.zeros_like(opacity)
     opened[:, 12:] = 1.0  # the mouth, further from the paint than the rim
     layer = Layer(Window(10, 8, 16, 12), opacity[..., None] * np.float32(0.5), opacity, opened)
-    result = composite(picture, layer, rim_px=2.0)
+    result = composite(image, layer, rim_px=2.0)
     same = np.ones((30, 40), bool)
     same[8 + 5 : 8 + 8, 10 + 5 : 10 + 8] = False
-    assert np.array_equal(result[same], picture[same])
+    assert np.array_equal(result[same], image[same])
     assert np.allclose(result[~same], 0.5)
 
 
@@ -216,7 +216,7 @@ def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opa
     assert np.array_equal(painted.linear[far], tattooed[far])
 
 
-def test_lips_outside_the_picture_are_left_alone(model, domain, textures, opacity):
+def test_lips_outside_the_image_are_left_alone(model, domain, textures, opacity):
     camera = lip_patch.cameras()["front"]
     paint = Paint(domain, textures[0], textures[2], opacity, Shading())
     away = model.neutral_mm + np.array([500.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""Inpainting: the mouth opening in the picture, and the shadow between the lips."""
+"""Inpainting: the mouth opening in the image, and the shadow between the lips."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def open_mouth(model):
     return camera, vertices, lip_patch.render(model, vertices, camera, tattoo=True)
 
 
-def opening_of(model, domain, camera, picture, vertices, **evidence):
+def opening_of(model, domain, camera, image, vertices, **evidence):
     ends = camera.project(vertices[domain.corners])
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     box = (np.zeros(2), np.array([camera.width_px, camera.height_px]))
     caster = RayCaster(vertices, model.triangles)
-    return find_opening(domain, caster, camera, picture, axis, box, 1 / 3, Evidence(**evidence))
+    return find_opening(domain, caster, camera, image, axis, box, 1 / 3, Evidence(**evidence))
 
 
 def wrong_pixels(opening, open_mouth, model) -> int:
@@ -45,18 +45,18 @@ def lower_lip_raised(vertices: np.ndarray, up_mm: float) -> np.ndarray:
 
 
 def test_the_opening_is_found_where_the_mesh_has_it_wrong(model, domain, open_mouth):
-    camera, vertices, picture = open_mouth
+    camera, vertices, image = open_mouth
     wrong = lower_lip_raised(vertices, 1.5)
-    believed = opening_of(model, domain, camera, picture, wrong, reach_mm=0.0)
-    found = opening_of(model, domain, camera, picture, wrong)
+    believed = opening_of(model, domain, camera, image, wrong, reach_mm=0.0)
+    found = opening_of(model, domain, camera, image, wrong)
     assert wrong_pixels(believed, open_mouth, model) > 150
     assert wrong_pixels(found, open_mouth, model) < 0.35 * wrong_pixels(believed, open_mouth, model)
 
 
 def test_an_opening_that_the_mesh_has_right_stays(model, domain, open_mouth):
-    camera, vertices, picture = open_mouth
-    mesh = opening_of(model, domain, camera, picture, vertices, reach_mm=0.0)
-    found = opening_of(model, domain, camera, picture, vertices)
+    camera, vertices, image = open_mouth
+    mesh = opening_of(model, domain, camera, image, vertices, reach_mm=0.0)
+    found = opening_of(model, domain, camera, image, vertices)
     step_mm = np.linalg.norm(found.across_px) / 3
     middle = slice(len(found.columns) // 4, -len(found.columns) // 4)
     assert np.abs(found.upper - mesh.upper)[middle].max() * step_mm < 0.5
@@ -64,13 +64,13 @@ def test_an_opening_that_the_mesh_has_right_stays(model, domain, open_mouth):
 
 
 def test_what_lies_behind_the_lips_is_not_painted(model, domain, textures, opacity, open_mouth):
-    camera, vertices, picture = open_mouth
+    camera, vertices, image = open_mouth
     paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, 0.0, grain=False)
     wrong = lower_lip_raised(vertices, 1.5)
-    painted = paint_frame(paint, picture, camera, wrong, model.triangles, (0,))
+    painted = paint_frame(paint, image, camera, wrong, model.triangles, (0,))
     behind = ~RayCaster(vertices, model.triangles).see(camera).hit
     behind = cv2.erode(behind.astype(np.uint8), np.ones((5, 5))) > 0
-    changed = np.abs(painted.linear - picture).max(axis=2) > 0.02
+    changed = np.abs(painted.linear - image).max(axis=2) > 0.02
     assert changed[behind].mean() < 0.01
 
 

@@ -6,9 +6,9 @@ from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.correct import correct_sequence
 from vermilion.correction.image_contours import (
-    PICTURE_ARRAYS,
-    Picture,
-    PictureSettings,
+    IMAGE_ARRAYS,
+    ImageContours,
+    ImageContourSettings,
     frames_around,
 )
 from vermilion.correction.neutral_pair import acquainted, neutral_pairs
@@ -44,28 +44,28 @@ def main(snakemake):
     model = acquainted(model, tracker.triangles, *neutral_pairs(inputs))
     identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
     settings = CorrectionConfig(
-        integration=params.cfg["correction.integration"], picture=params.cfg["correction.picture"]
+        integration=params.cfg["correction.integration"], image=params.cfg["correction.image"]
     )
     near = frames_around(frames, frames_of(inputs.coarse), settings.reach_frames(params.fps))
-    given = read_chunks(inputs.features, near, ["features", *PICTURE_ARRAYS])
+    given = read_chunks(inputs.features, near, ["features", *IMAGE_ARRAYS])
     features = np.where(given["valid"][:, None], given["features"], np.nan)
     coarse = np.asarray(read_frames(inputs.coarse, near), dtype=np.float64)
     pose, rows = (
         (fit.world_from_head_rotation, fit.world_from_head_translation_mm),
         fit.index_of(near),
     )
-    picture = Picture.of(
-        tracker, fit.camera, near, given, PictureSettings(**params.cfg["correction.picture"])
+    image = ImageContours.of(
+        tracker, fit.camera, near, given, ImageContourSettings(**params.cfg["correction.image"])
     )
     corrected = correct_sequence(
         model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
-        features, valid=fit.valid[rows], frames=near, picture=picture,
+        features, valid=fit.valid[rows], frames=near, image=image,
         **settings.integration.at(params.fps),
     )  # fmt: skip
     asked = np.searchsorted(near, frames)
     coarse, corrected, features, rows = (a[asked] for a in (coarse, corrected, features, rows))
     has_features, tracked = np.isfinite(features).all(axis=1), fit.valid[rows]
-    # The picture shows what the file holds: beyond its precision, sums differ from run to run.
+    # The image shows what the file holds: beyond its precision, sums differ from run to run.
     corrected = corrected.astype(np.float32).astype(np.float64)
     write_sequence(out.corrected, corrected)
 
@@ -90,12 +90,12 @@ def main(snakemake):
         tracker, identity.neutral_mm, *pose, fit.valid, camera, overlay.margin,
         overlay.panel_height_px,
     )  # fmt: skip
-    pictures = overlay_frames(
+    images = overlay_frames(
         view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames, rows,
         tracked, [("base track", coarse), (f"corrected, {model.name}", corrected)],
         overlay.opacity, "/".join(place),
     )  # fmt: skip
-    write_video(out.overlay, progress(pictures, "overlay", len(frames)), params.fps)
+    write_video(out.overlay, progress(images, "overlay", len(frames)), params.fps)
 
 
 if __name__ == "__main__":

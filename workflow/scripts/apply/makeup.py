@@ -58,21 +58,21 @@ def main(snakemake):
 
     def panels(index):
         try:
-            picture = source.read(camera.name, int(params.frames[index]))
+            image = source.read(camera.name, int(params.frames[index]))
         except InputError:
-            picture = np.zeros((camera.height_px, camera.width_px, 3), np.float32)
-        drawn = (picture, picture)
+            image = np.zeros((camera.height_px, camera.width_px, 3), np.float32)
+        drawn = (image, image)
         if fit.valid[rows[index]]:
-            drawn = makeup.draw(picture, camera, np.asarray(corrected[index], dtype=np.float64))
-        row = [crop.of_picture(to_display(part)) for part in (picture, *drawn)]
+            drawn = makeup.draw(image, camera, np.asarray(corrected[index], dtype=np.float64))
+        row = [crop.of_image(to_display(part)) for part in (image, *drawn)]
         joined = np.hstack([label(*pair) for pair in zip(row, NAMES, strict=True)])
         if index in (0, len(rows) // 2):
             shown.append(joined)
         return joined
 
-    pictures = (panels(index) for index in range(len(rows)))
-    write_video(snakemake.output.video, progress(pictures, "make-up", len(rows)), params.fps)
-    write_srgb8(snakemake.output.picture, np.vstack(shown))
+    images = (panels(index) for index in range(len(rows)))
+    write_video(snakemake.output.video, progress(images, "make-up", len(rows)), params.fps)
+    write_srgb8(snakemake.output.image, np.vstack(shown))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The make-up of a whole take as one video, and one picture of it."""
+"""The make-up of a whole take as one video, and one image of it."""
 
 import shutil
 
@@ -9,8 +9,8 @@ from vermilion.storage.logfile import log_to
 
 def main(snakemake):
     join_videos(snakemake.output.video, snakemake.input.videos)
-    with atomic_path(snakemake.output.picture) as temporary:
-        shutil.copyfile(snakemake.input.pictures[0], temporary)
+    with atomic_path(snakemake.output.image) as temporary:
+        shutil.copyfile(snakemake.input.images[0], temporary)
 
 
 if __name__ == "__main__":

@@ -34,17 +34,17 @@ def wanted(cfg, rig):
 
 
 def features_of(source, rig, frames, cfg):
-    """Frame -> camera -> features; pictures that cannot be read are left out."""
+    """Frame -> camera -> features; images that cannot be read are left out."""
     found = {}
     for frame in progress(frames, "features"):
         found[frame] = {}
         for name in rig.cameras:
             try:
-                picture = source.read(name, frame)
+                image = source.read(name, frame)
             except InputError as error:
                 print(error)
                 continue
-            found[frame][name] = find_features(picture, cfg.contrast, cfg.max_features)
+            found[frame][name] = find_features(image, cfg.contrast, cfg.max_features)
     return found
 
 
@@ -57,8 +57,8 @@ def refinement(cfg, rig, manifest, first, last):
         kind(**{f.name: values[f.name] for f in fields(kind)})
         for kind in (MatchSettings, RefineSettings)
     )
-    pictures = features_of(source, rig, frames, cfg)
-    made = refine_cameras(rig.cameras, pictures, matching, settings, cfg.mode == "auto")
+    images = features_of(source, rig, frames, cfg)
+    made = refine_cameras(rig.cameras, images, matching, settings, cfg.mode == "auto")
     print(
         f"refinement of the cameras {'applied' if made.applied else 'not applied'}: {made.reason}"
     )
@@ -66,7 +66,7 @@ def refinement(cfg, rig, manifest, first, last):
         raise InputError(
             f"cameras that could not be refined ({made.reason})",
             "features that many cameras share",
-            "Use more frames (`capture.refinement.frames`), check that the pictures are sharp and "
+            "Use more frames (`capture.refinement.frames`), check that the images are sharp and "
             "the poses within `capture.refinement.gate_deg`, or set `capture.refinement.mode: auto`.",
             subject=manifest.subject,
             take=manifest.take,
@@ -84,15 +84,15 @@ def overlay(rig, manifest, neutral, made):
             for name, moment in moments.items()
         }
         return calibration_sheet(rig.calibration, views)
-    source, pictures = open_frames(manifest.source, manifest.subject, manifest.take), {}
+    source, images = open_frames(manifest.source, manifest.subject, manifest.take), {}
     for name in rig.cameras:
         try:
-            pictures[name] = source.read(name, neutral)
+            images[name] = source.read(name, neutral)
         except InputError:
-            pictures[name] = None
-    if made is not None and made.shown and any(p is not None for p in pictures.values()):
-        return refinement_sheet(pictures, made.shown, made.moved)
-    return contact_sheet(pictures)
+            images[name] = None
+    if made is not None and made.shown and any(p is not None for p in images.values()):
+        return refinement_sheet(images, made.shown, made.moved)
+    return contact_sheet(images)
 
 
 def main(snakemake):

@@ -1,4 +1,4 @@
-"""Check the pictures of a chunk; write its manifest, quality rows and a contact sheet."""
+"""Check the images of a chunk; write its manifest, quality rows and a contact sheet."""
 
 from vermilion.capture.manifest import capture_manifest, quality_rows
 from vermilion.capture.overlay import contact_sheet
@@ -9,16 +9,16 @@ from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 
 
-def first_pictures(manifest, frame):
-    """Camera -> linear picture of a frame, None where it cannot be read."""
+def first_images(manifest, frame):
+    """Camera -> linear image of a frame, None where it cannot be read."""
     source = open_frames(manifest.source, manifest.subject, manifest.take)
-    pictures = {}
+    images = {}
     for camera in manifest.cameras:
         try:
-            pictures[camera] = source.read(camera, frame)
+            images[camera] = source.read(camera, frame)
         except InputError:
-            pictures[camera] = None
-    return pictures
+            images[camera] = None
+    return images
 
 
 def main(snakemake):
@@ -36,7 +36,7 @@ def main(snakemake):
     write_quality(
         snakemake.output.quality, subject, take, "capture", quality_rows(manifest, frames, [camera])
     )
-    write_srgb8(snakemake.output.overlay, contact_sheet(first_pictures(manifest, frames[0])))
+    write_srgb8(snakemake.output.overlay, contact_sheet(first_images(manifest, frames[0])))
     manifest.save(snakemake.output.manifest)
 
 

@@ -19,7 +19,7 @@ from vermilion.tracking.result import TrackedTake
 
 
 class TrackedRings:
-    """The tracked lips of a take in its pictures."""
+    """The tracked lips of a take in its images."""
 
     def __init__(self, inputs, landmarks: LandmarkTrack):
         self.fit = TrackedTake.load(inputs.fit)
@@ -37,7 +37,7 @@ class TrackedRings:
 
 
 def from_track(cfg, camera, source, track, rings):
-    """The detector that a take's own pictures and track tell; None where no frame serves."""
+    """The detector that a take's own images and track tell; None where no frame serves."""
     options = cfg.track
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector(

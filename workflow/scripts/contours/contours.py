@@ -30,11 +30,11 @@ def main(snakemake) -> None:
         lips = TrackedLips.of(FaceModel.load(snakemake.input.tracker))
         camera = TrackedTake.load(snakemake.input.fit).camera
     shown = evenly(track.frames.tolist(), cfg.overlay_frames)
-    rows, pictures = [], []
+    rows, images = [], []
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(track.frames.tolist(), "contour maps")):
             points = track.points_px[index]
-            maps, picture, row = frame_maps(
+            maps, image, row = frame_maps(
                 source,
                 snakemake.params.camera,
                 frame,
@@ -50,9 +50,9 @@ def main(snakemake) -> None:
             write_maps(folder / f"{frame:06d}.exr", *maps)
             if frame in shown or frame in labels:
                 drawn = read_label(labels[frame]) if frame in labels else None
-                pictures.append(maps_overlay(picture, maps, points, frame, drawn))
+                images.append(maps_overlay(image, maps, points, frame, drawn))
     write_quality(snakemake.output.quality, subject, take, "contours", rows)
-    write_srgb8(snakemake.output.overlay, sheet(pictures))
+    write_srgb8(snakemake.output.overlay, sheet(images))
 
 
 if __name__ == "__main__":

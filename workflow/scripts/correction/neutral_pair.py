@@ -1,4 +1,4 @@
-"""Coarse and accurate neutral of a take, one laid on the other, with the picture of their layer."""
+"""Coarse and accurate neutral of a take, one laid on the other, with the image of their layer."""
 
 import numpy as np
 

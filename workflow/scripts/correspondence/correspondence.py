@@ -32,10 +32,10 @@ def main(snakemake):
     found, registered, landmarks = correspond_neutrals(neutral, tracker, template, **settings)
     found.save(output.correspondence)
     frame = int(fit.frames[0])
-    picture = to_display(open_frames([inputs.picture], subject, take).read("", frame))
+    image = to_display(open_frames([inputs.image], subject, take).read("", frame))
     write_srgb8(
         output.overlay,
-        correspondence_overlay(picture, fit.camera, coarse, accurate, registered, landmarks, found),
+        correspondence_overlay(image, fit.camera, coarse, accurate, registered, landmarks, found),
     )
     row = quality_of(found, registered, accurate, frame)
     write_quality(output.quality, subject, take, "correspondence", [row])

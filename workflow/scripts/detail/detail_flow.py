@@ -23,7 +23,7 @@ def main(snakemake):
     first, last = params.span
     places = locate(inputs.coarse, range(first, last + 1))
 
-    def read_picture(frame):
+    def read_image(frame):
         return source.read(camera.name, frame)
 
     def read_mesh(frame):
@@ -35,14 +35,14 @@ def main(snakemake):
         FlowSettings(**cfg["detail.flow"]),
         DeformationSettings(**cfg["detail.deformation"]),
     )
-    correction = FlowCorrection(model, camera, read_picture(first), read_mesh(first), settings)
-    chunk = correct_frames(correction, params.frames, (first, last), read_picture, read_mesh)
+    correction = FlowCorrection(model, camera, read_image(first), read_mesh(first), settings)
+    chunk = correct_frames(correction, params.frames, (first, last), read_image, read_mesh)
     before = [read_mesh(frame) for frame in params.frames]
-    picture = checkerboard_sheet(
-        read_picture, camera, model, params.frames, before, chunk.vertices_mm,
+    image = checkerboard_sheet(
+        read_image, camera, model, params.frames, before, chunk.vertices_mm,
         cfg["detail.overlay_frames"],
     )  # fmt: skip
-    write_srgb8(snakemake.output.overlay, picture)
+    write_srgb8(snakemake.output.overlay, image)
     write_quality(snakemake.output.quality, subject, take, "detail", chunk.quality())
     for path, values in (
         (snakemake.output.start, chunk.before),

@@ -20,7 +20,7 @@ def main(snakemake):
     for frame in frames:
         try:
             seen[frame] = scene.sight(frame, scene.fine(frame))
-        except (InputError, ValueError):  # no picture, or the face is not in it: the others tell
+        except (InputError, ValueError):  # no image, or the face is not in it: the others tell
             continue
     if not any(sight.trust.any() for sight in seen.values()):
         raise InputError(

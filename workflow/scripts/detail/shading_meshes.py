@@ -47,11 +47,11 @@ def main(snakemake):
             names = zip("RGB", np.moveaxis(drawn, 2, 0), strict=True)
             write_channels(folder / f"{frame:06d}.exr", dict(names))
             meshes.append(mesh)
-            row, picture, errors = residuals(scene, light, reader, frame, smooth, mesh)
+            row, image, errors = residuals(scene, light, reader, frame, smooth, mesh)
             quality.append(row)
-            if index in shown and picture is not None:
+            if index in shown and image is not None:
                 panels += relief_panels(
-                    f"{frame}", picture, scene.camera, topology, smooth, mesh, errors
+                    f"{frame}", image, scene.camera, topology, smooth, mesh, errors
                 )
     blank = np.zeros((64, 256, 3), dtype=np.uint8)
     write_srgb8(snakemake.output.overlay, tile(panels, 4) if panels else blank)
@@ -70,22 +70,22 @@ def main(snakemake):
 
 
 def residuals(scene, light, reader, frame, smooth, mesh):
-    """Quality row of a frame, its picture (None without), and errors of the skin's triangles."""
+    """Quality row of a frame, its image (None without), and errors of the skin's triangles."""
     relief = np.linalg.norm(mesh - smooth, axis=1).max()
     figures = {"residual_before": np.nan, "residual_after": np.nan, "relief_mm": relief}
     try:
-        picture = scene.read_picture(frame)
+        image = scene.read_image(frame)
         sight = scene.sight(frame, smooth)
     except (InputError, ValueError):
-        return QualityRow(frame, False, reader.reason(frame) or "no picture", figures), None, None
+        return QualityRow(frame, False, reader.reason(frame) or "no image", figures), None, None
     before, after = (
         errors_of(scene.topology, light, sight, m, scene.camera) for m in (smooth, mesh)
     )
     figures["residual_before"] = residual_of(before, sight.trust)
     figures["residual_after"] = residual_of(after, sight.trust)
     worse = figures["residual_after"] > figures["residual_before"]
-    reason = "the relief explains the picture worse" if worse else ""
-    return QualityRow(frame, True, reason, figures), picture, after
+    reason = "the relief explains the image worse" if worse else ""
+    return QualityRow(frame, True, reason, figures), image, after
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ from vermilion.baselines.lip_shapes import LipShapes
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
 from vermilion.correction.image_contours import (
-    PICTURE_ARRAYS,
-    Picture,
-    PictureSettings,
+    IMAGE_ARRAYS,
+    ImageContours,
+    ImageContourSettings,
     frames_around,
 )
 from vermilion.correction.neutral_pair import acquainted, neutral_pairs
@@ -82,10 +82,10 @@ def true_curves(snakemake, frames, place):
 
 
 def coarse_take(inputs, tracker, fit, frames, correction, fps):
-    """The coarse track at the frames, with its features and what was found in the picture."""
+    """The coarse track at the frames, with its features and what was found in the image."""
     rows = fit.index_of(frames)
-    features = read_chunks(inputs.features, frames, ["features", *PICTURE_ARRAYS])
-    settings = PictureSettings(**correction.picture.model_dump())
+    features = read_chunks(inputs.features, frames, ["features", *IMAGE_ARRAYS])
+    settings = ImageContourSettings(**correction.image.model_dump())
     return CoarseTake(
         frames,
         np.asarray(read_frames(inputs.coarse, frames), dtype=np.float64),
@@ -95,7 +95,7 @@ def coarse_take(inputs, tracker, fit, frames, correction, fps):
         fit.world_from_head_translation_mm[rows],
         np.where(features["valid"][:, None], features["features"], np.nan),
         **correction.integration.at(fps),
-        picture=Picture.of(tracker, fit.camera, frames, features, settings),
+        image=ImageContours.of(tracker, fit.camera, frames, features, settings),
     )
 
 
@@ -135,7 +135,7 @@ def contour_track(inputs, tracker, fit, take, correspondence, contours, options)
 
 
 def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
-    """Sums by clip of every sequence: against the reference, in the picture, in the layers."""
+    """Sums by clip of every sequence: against the reference, in the image, in the layers."""
     found_px = contours["outer_px"], contours["inner_px"]
     sums = {
         name: result.sums[name]
@@ -161,7 +161,7 @@ def main(snakemake):
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
     correction = CorrectionConfig(
-        integration=cfg["correction.integration"], picture=cfg["correction.picture"]
+        integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
     fps = snakemake.params.fps
     near = frames_around(frames, fit.frames, correction.reach_frames(fps))

@@ -17,8 +17,8 @@ from vermilion.storage.tables import read_table
 LIPS_MM = 110.0
 
 
-def pictures(snakemake, shown, size_px):
-    """The mouth in the take's own pictures at the scale of the renders."""
+def images(snakemake, shown, size_px):
+    """The mouth in the take's own images at the scale of the renders."""
     source = open_frames(
         snakemake.params.source, snakemake.wildcards.subject, snakemake.wildcards.take
     )
@@ -27,10 +27,10 @@ def pictures(snakemake, shown, size_px):
         shown["frames"], shown["centre_px"], shown["px_per_mm"], strict=True
     ):
         try:
-            picture = to_display(source.read(snakemake.params.camera, int(frame)))
+            image = to_display(source.read(snakemake.params.camera, int(frame)))
         except InputError:
-            picture = np.full((8, 8, 3), 255, np.uint8)
-        found.append(mesh_sheets.crop(picture, centre, LIPS_MM * scale, size_px))
+            image = np.full((8, 8, 3), 255, np.uint8)
+        found.append(mesh_sheets.crop(image, centre, LIPS_MM * scale, size_px))
     return found
 
 
@@ -40,8 +40,8 @@ def of_regressors(shown, name):
     return {key: shown[name][names.index(key)] for key in in_order(names)}
 
 
-def with_bar(picture, bar):
-    return np.vstack([picture, bar])
+def with_bar(image, bar):
+    return np.vstack([image, bar])
 
 
 def main(snakemake):
@@ -56,9 +56,9 @@ def main(snakemake):
     columns = mesh_sheets.error_columns(
         meshes, of_regressors(shown, "errors_mm"), triangles, cfg.error_scale_mm
     )
-    picture = mesh_sheets.sheet(columns, frames, np.nanmean(mouth, axis=1), wide, size)
-    bar = mesh_sheets.error_bar(picture.shape[1], cfg.error_scale_mm)
-    write_srgb8(out.maps, with_bar(picture, bar))
+    image = mesh_sheets.sheet(columns, frames, np.nanmean(mouth, axis=1), wide, size)
+    bar = mesh_sheets.error_bar(image.shape[1], cfg.error_scale_mm)
+    write_srgb8(out.maps, with_bar(image, bar))
 
     lips = base[:, shown["vermilion"]].mean(axis=1)
     place = (frames, lips, LIPS_MM, size)
@@ -66,15 +66,15 @@ def main(snakemake):
     columns = mesh_sheets.clay_columns(meshes, triangles, shown["vermilion"])
     red = mesh_sheets.labels_nearby(shown["vermilion"], shown["points_mm"][0], surface[0])
     columns += mesh_sheets.clay_columns({"truth": surface}, shown["surface_triangles"], red)
-    write_srgb8(out.renders, mesh_sheets.sheet(columns, *place, pictures(snakemake, shown, size)))
+    write_srgb8(out.renders, mesh_sheets.sheet(columns, *place, images(snakemake, shown, size)))
 
     columns = mesh_sheets.stretch_columns(
         meshes | {"truth": shown["points_mm"]},
         of_regressors(shown, "neutrals_mm") | {"truth": shown["rest_mm"]},
         triangles,
     )
-    picture = mesh_sheets.sheet(columns, *place)
-    write_srgb8(out.stretch, with_bar(picture, mesh_sheets.stretch_bar(picture.shape[1])))
+    image = mesh_sheets.sheet(columns, *place)
+    write_srgb8(out.stretch, with_bar(image, mesh_sheets.stretch_bar(image.shape[1])))
 
     title = f"{snakemake.wildcards.subject}/{snakemake.wildcards.take}"
     curves(read_table(snakemake.input.frames), title, out.curves)

@@ -46,7 +46,7 @@ def main(snakemake):
         rbf_and_affine(configured),
         snakemake.output.figure16,
     )
-    bars(summary, snakemake.output.picture)
+    bars(summary, snakemake.output.image)
     print(summary.to_string())
 
 

@@ -39,7 +39,7 @@ def main(snakemake) -> None:
     sampler = ContourSampler.of(model, cfg.samples, SearchSettings.of(cfg))
     source = open_frames(snakemake.params.source, subject, take)
     shown = evenly(list(snakemake.params.frames), cfg.overlay_frames)
-    contours, quality, pictures = [], [], []
+    contours, quality, images = [], [], []
     for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):
         path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
         row = rows[index]
@@ -52,10 +52,10 @@ def main(snakemake) -> None:
         quality.append(judge(frame, found, tracked, maps is not None, cfg.least_found))
         if frame in shown:
             try:
-                picture = source.read(snakemake.params.camera, frame)
+                image = source.read(snakemake.params.camera, frame)
             except InputError:
                 continue
-            pictures.append(contours_overlay(picture, found, frame))
+            images.append(contours_overlay(image, found, frame))
     table = FeatureTable.of(
         snakemake.params.frames,
         space.coefficients(displacement),
@@ -65,7 +65,7 @@ def main(snakemake) -> None:
     )
     table.save(snakemake.output.features)
     write_quality(snakemake.output.quality, subject, take, "features", quality)
-    write_srgb8(snakemake.output.overlay, sheet(pictures, columns=5))
+    write_srgb8(snakemake.output.overlay, sheet(images, columns=5))
 
 
 if __name__ == "__main__":

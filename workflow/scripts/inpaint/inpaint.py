@@ -55,7 +55,7 @@ def main(snakemake):
             try:
                 linear = source.read(name, frame)
             except InputError as error:
-                rows.append(QualityRow(frame, False, f"the picture cannot be read: {error}"))
+                rows.append(QualityRow(frame, False, f"the image cannot be read: {error}"))
                 continue
             vertices = np.asarray(meshes[index], dtype=np.float64)
             painted = None
@@ -63,7 +63,7 @@ def main(snakemake):
                 noise = seed_of(seed, **place, frame=frame)
                 painted = paint_frame(paint, linear, camera, vertices, model.triangles, noise)
             if painted is None:
-                rows.append(QualityRow(frame, False, "no mesh in the picture"))
+                rows.append(QualityRow(frame, False, "no mesh in the image"))
                 continue
             write_image(folder / f"{frame:06d}.png", painted.linear)
             figures = {

@@ -5,7 +5,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detect import draw_landmarks
 from vermilion.landmarks.labels import read_labels
-from vermilion.landmarks.training import TrainingSettings, labelled_pictures, train_descent
+from vermilion.landmarks.training import TrainingSettings, labelled_images, train_descent
 from vermilion.storage.logfile import log_to
 
 
@@ -16,9 +16,9 @@ def main(snakemake):
         name = (take["subject"], take["take"])
         sources[name] = open_frames(take["source"], *name)
         labels += [(sources[name], label) for label in read_labels(take["source"])]
-    pictures, points = labelled_pictures(labels, settings.max_frames)
-    detector = train_descent(pictures, points, settings)
-    drawn = [draw_landmarks(to_display(p), detector.detect(p)) for p in pictures[:12]]
+    images, points = labelled_images(labels, settings.max_frames)
+    detector = train_descent(images, points, settings)
+    drawn = [draw_landmarks(to_display(p), detector.detect(p)) for p in images[:12]]
     write_srgb8(snakemake.output.overlay, tile(drawn, 4))
     detector.save(snakemake.output.model)
 

@@ -1,4 +1,4 @@
-"""Landmarks of a chunk of the monocular pictures, with quality rows and an overlay."""
+"""Landmarks of a chunk of the monocular images, with quality rows and an overlay."""
 
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8

@@ -23,22 +23,22 @@ def main(snakemake):
     kind, detector = cfg["landmarks.detector"], None
     if kind != "csv":
         detector = open_detector(kind, snakemake.params.model, cfg["landmarks.networks"])
-    found, pictures = {}, []
+    found, images = {}, []
     for camera in read_cameras(snakemake.input.cameras):
         found[camera] = Landmarks.none()
         try:
-            picture = source.read(camera, frame)
+            image = source.read(camera, frame)
         except InputError as error:
             print(error)
             continue
         path = Path(snakemake.params.csv.format(camera=camera))
         if detector is not None:
-            found[camera] = detector.detect(picture)
+            found[camera] = detector.detect(image)
         elif path.is_file():
             settings = {k: v for k, v in cfg["landmarks.csv"].items() if k != "path"}
             found[camera] = read_landmark_csv(path, **settings).at(frame)
-        pictures.append(label(draw_landmarks(to_display(picture), found[camera]), camera))
-    write_srgb8(snakemake.output.overlay, tile(pictures, 5))
+        images.append(label(draw_landmarks(to_display(image), found[camera]), camera))
+    write_srgb8(snakemake.output.overlay, tile(images, 5))
     LandmarkViews.of(found).save(snakemake.output.views)
 
 

@@ -9,7 +9,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.multiview.anchors import TrackSettings, find_anchor
 from vermilion.multiview.files import read_neutral, write_anchor
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures, open_coarse
+from vermilion.multiview.take import ImageSettings, MultiviewImages, open_coarse
 from vermilion.storage.logfile import log_to
 
 
@@ -21,9 +21,9 @@ def main(snakemake):
     scale = track.pop("scale")
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
+    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
-    reference, load = open_coarse(pictures, params.neutral, neutral, model.triangles, scale)
+    reference, load = open_coarse(images, params.neutral, neutral, model.triangles, scale)
     anchor = find_anchor(reference, params.window, load, FlowMatcher(), TrackSettings(**track))
     if anchor.frame < 0:
         print(f"no frame of {params.window} is like the neutral: the clips before and after join")

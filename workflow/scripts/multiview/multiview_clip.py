@@ -10,7 +10,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.multiview.anchors import TrackSettings, clip_frames_of
 from vermilion.multiview.files import read_anchor, read_neutral, write_clip
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures, open_coarse
+from vermilion.multiview.take import ImageSettings, MultiviewImages, open_coarse
 from vermilion.multiview.track import Clip, track_clip
 from vermilion.storage.logfile import log_to
 
@@ -32,8 +32,8 @@ def main(snakemake):
         write_clip(snakemake.output.clip, nothing)
         return
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
-    reference, load = open_coarse(pictures, first, neutral, model.triangles, scale)
+    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
+    reference, load = open_coarse(images, first, neutral, model.triangles, scale)
     start = anchors[index - 1].vertices_mm if index else neutral
     numbers, stop = list(frames), None
     if end is not None:

@@ -9,7 +9,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.multiview.drift import DriftSettings, Origin, carry, drift_rows, unread_row
 from vermilion.multiview.files import read_neutral
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures
+from vermilion.multiview.take import ImageSettings, MultiviewImages
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -25,13 +25,13 @@ def main(snakemake):
     settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(snakemake.params.source, **place)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
+    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
-    origin = Origin.of(pictures.load(snakemake.params.neutral, settings.scale), neutral, model)
+    origin = Origin.of(images.load(snakemake.params.neutral, settings.scale), neutral, model)
     meshes, matcher, rows = read_sequence(snakemake.input.meshes), FlowMatcher(), []
     for number, mesh in progress(zip(frames, meshes, strict=True), "drift", len(frames)):
         try:
-            frame = pictures.load(number, settings.scale)
+            frame = images.load(number, settings.scale)
         except InputError as error:
             rows.append(unread_row(number, str(error)))
             continue

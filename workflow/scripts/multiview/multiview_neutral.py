@@ -15,20 +15,20 @@ from vermilion.multiview.neutral import NeutralSettings, StereoSettings, registe
 from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.register_to_first_take import with_points_of
-from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_ply
 
 
 def refiner_of_first_take(snakemake, image_settings, stereo, model):
-    """What registers pictures to the neutral of the person's first take."""
+    """What registers images to the neutral of the person's first take."""
     first = snakemake.params.first
     source = open_frames(first["source"], snakemake.wildcards.subject, first["take"])
-    pictures = Pictures(source, read_cameras(snakemake.input.first_cameras), image_settings)
+    images = MultiviewImages(source, read_cameras(snakemake.input.first_cameras), image_settings)
     neutral = read_neutral(snakemake.input.first_neutral, model.n_vertices)
     settings = RefineSettings(**RefineConfig(**first["cfg"]["multiview.refine"]).model_dump())
-    return Refiner(pictures, model, first["frame"], neutral, stereo, settings, FlowMatcher())
+    return Refiner(images, model, first["frame"], neutral, stereo, settings, FlowMatcher())
 
 
 def main(snakemake):
@@ -42,7 +42,7 @@ def main(snakemake):
     cameras = read_cameras(snakemake.input.cameras)
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     source = open_frames(snakemake.params.source, subject, take)
-    frame = Pictures(source, cameras, image_settings).load(snakemake.params.frame)
+    frame = MultiviewImages(source, cameras, image_settings).load(snakemake.params.frame)
     names, points, confidence = read_views(snakemake.input.landmarks, frame.views)
     landmarks = triangulate_landmarks(
         cameras,
@@ -63,7 +63,7 @@ def main(snakemake):
         if why:
             print(
                 f"WARNING: {subject}/{take}: found {why} between its neutral and that of {name}; "
-                f"expected pictures that match. Its own fit is kept, whose vertices may lie elsewhere "
+                f"expected images that match. Its own fit is kept, whose vertices may lie elsewhere "
                 f"on the skin than those of {name}. Look at both neutrals' overlays."
             )
         else:

@@ -13,7 +13,7 @@ from vermilion.multiview.files import read_neutral, read_track
 from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures, Refiner, RefineSettings
+from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.storage.files import atomic_path
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -30,11 +30,11 @@ def main(snakemake):
     settings = RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump())
     model = FaceModel.load(snakemake.input.template)
     source = open_frames(snakemake.params.source, subject, take)
-    pictures = Pictures(source, read_cameras(snakemake.input.cameras), image_settings)
+    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
     coarse = read_track(snakemake.input.track, frames)
     refiner = Refiner(
-        pictures, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
+        images, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
     )
     drawn = {frames[i] for i in np.linspace(0, len(frames) - 1, 3).astype(int)}
     meshes, seeing, rows, shown = [], [], [], []
@@ -44,7 +44,7 @@ def main(snakemake):
         seeing.append(found.registered.cameras_seeing)
         rows.append(found.quality)
         if number in drawn and found.quality.valid:
-            shown.append((pictures.load(number), found))
+            shown.append((images.load(number), found))
     write_sequence(snakemake.output.meshes, np.array(meshes))
     with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
         np.save(stream, np.array(seeing))

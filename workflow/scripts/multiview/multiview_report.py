@@ -18,7 +18,7 @@ from vermilion.multiview.drift import DriftSettings
 from vermilion.multiview.files import read_anchors, read_neutral
 from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, Pictures, RefineSettings
+from vermilion.multiview.take import ImageSettings, MultiviewImages, RefineSettings
 from vermilion.report.multiview_page import Findings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
@@ -47,18 +47,18 @@ def main(snakemake):
     drift_settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
     model = FaceModel.load(inputs.template)
     image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    pictures = Pictures(
+    images = MultiviewImages(
         open_frames(snakemake.params.source, **place), read_cameras(inputs.cameras), image_settings
     )
     sheets = TakeSheets(
-        pictures,
+        images,
         model,
         snakemake.params.neutral,
         read_neutral(inputs.neutral, model.n_vertices, **place),
         StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump()),
         RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump()),
         drift_settings,
-        SheetSettings(report.picture_px, report.residual_px, report.cloud_mm, drift_settings.scale),
+        SheetSettings(report.image_px, report.residual_px, report.cloud_mm, drift_settings.scale),
         FlowMatcher(),
     )
     drift, frames = joined(inputs.drift), pd.DataFrame()
@@ -77,7 +77,7 @@ def main(snakemake):
     found = Findings(
         "/".join(place.values()),
         snakemake.params.neutral,
-        sorted(pictures.cameras),
+        sorted(images.cameras),
         frames,
         drift,
         sheets.across_rows(),

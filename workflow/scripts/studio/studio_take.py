@@ -1,11 +1,11 @@
-"""Pictures of a chunk of a synthetic take."""
+"""Images of a chunk of a synthetic take."""
 
 from pathlib import Path
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.storage.logfile import log_to
-from vermilion.studio.capture_writer import write_pictures
+from vermilion.studio.capture_writer import write_images
 from vermilion.studio.take import plan_of
 
 if __name__ == "__main__":
@@ -13,8 +13,8 @@ if __name__ == "__main__":
     cfg = snakemake.params.cfg
     plan = plan_of(FaceModel.load(snakemake.input.model), **cfg["plan"])
     folder = Path(snakemake.input.cameras[0]).parent
-    pictures = cfg["pictures"]
-    write_pictures(
+    images = cfg["images"]
+    write_images(
         plan,
         read_cameras(folder),
         folder.parent,
@@ -22,9 +22,9 @@ if __name__ == "__main__":
         cfg["plan"]["first"],
         name=cfg["name"],
         seed=cfg["plan"]["seed"],
-        noise_read=pictures["noise_read"],
-        noise_shot=pictures["noise_shot"],
-        n_directions=pictures["occlusion_directions"],
-        n_points=pictures["light_samples"],
-        edge_samples=pictures["edge_samples"],
+        noise_read=images["noise_read"],
+        noise_shot=images["noise_shot"],
+        n_directions=images["occlusion_directions"],
+        n_points=images["light_samples"],
+        edge_samples=images["edge_samples"],
     )

@@ -9,7 +9,7 @@ from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.tracking.image_fit.choose_frames import choose_frames
 from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.tracking.image_fit.overlay import appearance_picture
+from vermilion.tracking.image_fit.overlay import appearance_image
 from vermilion.tracking.image_fit.take import TakeStart, learn_appearance
 
 
@@ -31,9 +31,9 @@ def main(snakemake):
     face, source = start.face(samples), open_frames(snakemake.params.source, *place)
     settings = PhotometricSettings(**cfg["refinement.fit"])
     views = []
-    for row in rows:  # one whole picture in memory at a time
-        picture = source.read(fit.camera.name, int(fit.frames[row]))
-        views.append(start.view(row, picture, face, options["pixel_mm"], len(settings.iterations)))
+    for row in rows:  # one whole image in memory at a time
+        image = source.read(fit.camera.name, int(fit.frames[row]))
+        views.append(start.view(row, image, face, options["pixel_mm"], len(settings.iterations)))
     appearance = learn_appearance(
         fit.frames[rows], views, face, samples, options["albedo_prior"], options["rounds"],
         lambda found: FrameProblem(face, found, settings, start.settings.weight_sigma),
@@ -42,7 +42,7 @@ def main(snakemake):
     print(f"frames {appearance.frames}, light {light}, spread {np.median(appearance.spread):.2f}")
     write_srgb8(
         snakemake.output.overlay,
-        appearance_picture(
+        appearance_image(
             source.read(fit.camera.name, int(fit.frames[rows[0]])),
             start,
             start.x[rows[0]],

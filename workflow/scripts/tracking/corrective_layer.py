@@ -25,8 +25,8 @@ def main(snakemake):
         return source.read(fit.camera.name, int(params.frames[index]))
 
     # A frame that cannot be read keeps the model alone, as where nothing is seen.
-    for index, picture in readable(fit.valid[rows], read, "corrective layer"):
-        view = start.view(index, picture, face, pixel_mm, len(settings.iterations))
+    for index, image in readable(fit.valid[rows], read, "corrective layer"):
+        view = start.view(index, image, face, pixel_mm, len(settings.iterations))
         offsets[index] = layer.solve(view)
     write_sequence(snakemake.output[0], offsets)
 

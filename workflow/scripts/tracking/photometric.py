@@ -1,4 +1,4 @@
-"""Pose and expression of each frame of a chunk from its picture."""
+"""Pose and expression of each frame of a chunk from its image."""
 
 from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames

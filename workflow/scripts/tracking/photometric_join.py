@@ -13,7 +13,7 @@ def main(snakemake):
     fit, _, start = TakeStart.load(inputs, cfg)
     names = ["x", "matrix", "right", "refined"]
     found = read_chunks(inputs.chunks, fit.frames, names)
-    # Pictures tell weights and depth with more noise than landmarks do: so they are smoothed more.
+    # Images tell weights and depth with more noise than landmarks do: so they are smoothed more.
     smooth = replace(start.settings, **cfg["refinement.join"])
     x = join_frames(
         found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth

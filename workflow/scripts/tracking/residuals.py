@@ -1,4 +1,4 @@
-"""What each step of the track leaves unexplained of a chunk's pictures, as tables and pictures."""
+"""What each step of the track leaves unexplained of a chunk's images, as tables and images."""
 
 import numpy as np
 
@@ -40,9 +40,9 @@ def main(snakemake):
     tables, sheet = {step: [] for step in steps}, []
     for index, frame in enumerate(params.frames):
         try:
-            picture = source.read(fit.camera.name, int(frame)) if fit.valid[rows[index]] else None
+            image = source.read(fit.camera.name, int(frame)) if fit.valid[rows[index]] else None
         except InputError:
-            picture = None
+            image = None
         results = []
         for step, start in starts.items():
             row = {
@@ -50,16 +50,16 @@ def main(snakemake):
                 "residual": np.nan,
                 "learnt_from": int(frame in appearance.frames),
             }
-            if picture is not None:
+            if image is not None:
                 pixel_mm = cfg["refinement.appearance"]["pixel_mm"]
-                view = start.view(index, picture, face, pixel_mm, 1)
+                view = start.view(index, image, face, pixel_mm, 1)
                 offsets = at @ moved[index] if step == "layer" else 0.0
                 errors, trust, places = sample_errors(view, view.start, face, appearance, offsets)
                 row["residual"] = photometric_residual(errors, trust)
                 results.append((f"{step} {row['residual']:.2f}", errors, trust, places))
             tables[step].append(row)
-        if picture is not None and index in shown:
-            sheet.append((f"{frame}", picture, results))
+        if image is not None and index in shown:
+            sheet.append((f"{frame}", image, results))
     write_srgb8(snakemake.output.overlay, residual_sheet(sheet, fit.camera))
     for step, path in zip(steps, snakemake.output.tables, strict=True):
         write_table(path, tables[step])

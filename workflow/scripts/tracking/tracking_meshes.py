@@ -1,4 +1,4 @@
-"""The coarse meshes of a chunk in the world, their quality rows, the model over the pictures."""
+"""The coarse meshes of a chunk in the world, their quality rows, the model over the images."""
 
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
@@ -19,7 +19,7 @@ def main(snakemake):
     rows = fit.index_of(frames)
     offsets = read_sequence(inputs.offsets) if inputs.get("offsets") else None
     vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows, offsets)
-    picture = tracking_overlay(
+    image = tracking_overlay(
         open_frames(snakemake.params.source, subject, take),
         fit.camera,
         tracker,
@@ -29,7 +29,7 @@ def main(snakemake):
         fit.valid[rows],
         snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
     )
-    write_srgb8(snakemake.output.overlay, picture)
+    write_srgb8(snakemake.output.overlay, image)
     write_quality(snakemake.output.quality, subject, take, "tracking", quality_rows(fit, rows))
     write_sequence(snakemake.output.meshes, vertices)
 

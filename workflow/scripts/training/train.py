@@ -1,4 +1,4 @@
-"""One regressor, its cross-validation curve and that curve's picture."""
+"""One regressor, its cross-validation curve and that curve's image."""
 
 from vermilion.config.training import TrainingConfig
 from vermilion.database.read import LipDatabase
@@ -22,7 +22,7 @@ def main(snakemake):
     table = curve_table(name, curve, selection.choice)
     print(table.to_string())
     write_table(output.curve, table)
-    plot_curve(output.picture, name, curve, selection.choice)
+    plot_curve(output.image, name, curve, selection.choice)
     save_model(output.model, model)
 
 

@@ -5,21 +5,21 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-#: Maps of a picture, each of three colours: f, f_x, f_y, f_xx, f_xy, f_yy.
+#: Maps of an image, each of three colours: f, f_x, f_y, f_xx, f_xy, f_yy.
 N_MAPS = 6
 _BLUR_PX = 0.7
 
 
-def channels(picture: np.ndarray) -> np.ndarray:
+def channels(image: np.ndarray) -> np.ndarray:
     """Of (h, w, 3) display values, (h, w, 18) float32: `N_MAPS` times red, green, blue."""
-    smooth = cv2.GaussianBlur(picture, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
+    smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)
     return np.concatenate([smooth, x, y, _across(x), _down(x), _down(y)], axis=2)
 
 
-def structure(picture: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
+def structure(image: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
     """Unit direction across image structures, (h, w, 2) float32: main axis of the structure tensor."""
-    smooth = cv2.GaussianBlur(picture, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
+    smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)
     parts = [(a * b).sum(axis=2) for a, b in ((x, x), (x, y), (y, y))]
     xx, xy, yy = (cv2.GaussianBlur(part, (0, 0), scale_px) for part in parts)

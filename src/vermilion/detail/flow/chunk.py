@@ -33,12 +33,12 @@ class CorrectedChunk:
     reasons: tuple[str, ...]
 
     def quality(self) -> list[QualityRow]:
-        """A row a frame; a frame whose picture is explained worse than before is warned of."""
+        """A row a frame; a frame whose image is explained worse than before is warned of."""
         rows = []
         for frame, before, after, flow, reason in zip(
             self.frames, self.before, self.after, self.flow_px, self.reasons, strict=True
         ):
-            worse = "" if reason or not after > before else "the flow explains the picture worse"
+            worse = "" if reason or not after > before else "the flow explains the image worse"
             figures = {"residual_before": before, "residual_after": after, "flow_px": flow}
             rows.append(QualityRow(int(frame), not reason, reason or worse, figures))
         return rows
@@ -48,26 +48,26 @@ def correct_frames(
     correction: FlowCorrection,
     frames: Sequence[int],
     span: tuple[int, int],
-    read_picture: Callable[[int], np.ndarray],
+    read_image: Callable[[int], np.ndarray],
     read_mesh: Callable[[int], np.ndarray],
 ) -> CorrectedChunk:
     """Correct frames one by one.
 
     Args:
         span: first and last frame of the take; beyond them a frame stands in for its neighbour.
-        read_picture: frame -> linear (h, w, 3), or InputError; read_mesh: frame -> (V, 3).
+        read_image: frame -> linear (h, w, 3), or InputError; read_mesh: frame -> (V, 3).
     """
-    picture_of = lru_cache(maxsize=4)(read_picture)
+    image_of = lru_cache(maxsize=4)(read_image)
     results = []
     for frame in progress(list(frames), "corrective flow"):
         near = [frame, min(frame + 1, span[1]), max(frame - 1, span[0])]
         try:
-            pictures = [picture_of(f) for f in near]
-            found = correction.correct(pictures, np.stack([read_mesh(f) for f in near]))
+            images = [image_of(f) for f in near]
+            found = correction.correct(images, np.stack([read_mesh(f) for f in near]))
             results.append((found, ""))
         except InputError as error:
             results.append((_uncorrected(read_mesh(frame)), f"not corrected: {error}"))
-        except ValueError as error:  # the face left the picture
+        except ValueError as error:  # the face left the image
             results.append((_uncorrected(read_mesh(frame)), f"not corrected: {error}"))
     done = [result for result, _ in results]
     return CorrectedChunk(

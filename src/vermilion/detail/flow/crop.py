@@ -1,4 +1,4 @@
-"""The part of a picture that shows the face, at the resolution at which flow is computed."""
+"""The part of an image that shows the face, at the resolution at which flow is computed."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from vermilion.imaging.images import linear_to_srgb
 
 @dataclass(frozen=True)
 class Crop:
-    """A rectangle of a camera's picture, resized.
+    """A rectangle of a camera's image, resized.
 
     Attributes:
         camera: the camera of the resized rectangle.
-        corner_px: (2,) int, left and top edge in the whole picture.
-        size_px: (2,) int, width and height in the whole picture.
+        corner_px: (2,) int, left and top edge in the whole image.
+        size_px: (2,) int, width and height in the whole image.
     """
 
     camera: Camera
@@ -29,7 +29,7 @@ class Crop:
     def around(cls, camera: Camera, points_px: np.ndarray, margin: float, most_px: int) -> Crop:
         """Round points (..., 2) with a share of their extent as margin; at most `most_px` a side.
 
-        Never enlarged. Raises ValueError where the points miss the picture.
+        Never enlarged. Raises ValueError where the points miss the image.
         """
         points = points_px.reshape(-1, 2)
         points = points[np.isfinite(points).all(axis=1)]
@@ -41,7 +41,7 @@ class Crop:
         low = np.clip(np.floor(low - border), 0, size).astype(int)
         high = np.clip(np.ceil(high + border), 0, size).astype(int)
         if (high - low < 16).any():
-            raise ValueError("the face lies outside the picture")
+            raise ValueError("the face lies outside the image")
         width, height = (int(n) for n in high - low)
         cut = camera.colmap()
         cut.principal_point_x -= int(low[0])
@@ -50,8 +50,8 @@ class Crop:
         scale = min(1.0, most_px / max(width, height))
         return cls(part.resized(scale), (int(low[0]), int(low[1])), (width, height))
 
-    def picture(self, linear: np.ndarray) -> np.ndarray:
-        """The crop of a linear picture (h, w, 3) as display values 0 to 255, (h', w', 3) float32."""
+    def image(self, linear: np.ndarray) -> np.ndarray:
+        """The crop of a linear image (h, w, 3) as display values 0 to 255, (h', w', 3) float32."""
         (x, y), (width, height) = self.corner_px, self.size_px
         part = linear_to_srgb(linear[y : y + height, x : x + width]) * np.float32(255)
         size = (self.camera.width_px, self.camera.height_px)

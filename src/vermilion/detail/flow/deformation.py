@@ -84,7 +84,7 @@ def corrected_mesh(
 
 
 def spread(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
-    """Of the candidates (ids into (V, 2) pixels), in each square of the picture the most central."""
+    """Of the candidates (ids into (V, 2) pixels), in each square of the image the most central."""
     if spacing_px <= 0 or not len(candidates):
         return candidates
     cell = np.floor(pixels[candidates] / spacing_px)

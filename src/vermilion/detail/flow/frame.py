@@ -1,4 +1,4 @@
-"""Correction of one frame's mesh from three meshes and three pictures (Mono13 section 7)."""
+"""Correction of one frame's mesh from three meshes and three images (Mono13 section 7)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class CorrectedFrame:
         vertices_mm: (V, 3) in the world.
         before, after: mean absolute photometric residual over the face, display values 0 to 255, over
             the pixels that both meshes texture.
-        flow_px: median length of the corrective flow over the face, pixels of the whole picture.
+        flow_px: median length of the corrective flow over the face, pixels of the whole image.
     """
 
     vertices_mm: np.ndarray
@@ -67,33 +67,33 @@ class FlowCorrection:
         self,
         model: FaceModel,
         camera: Camera,
-        first_picture: np.ndarray,
+        first_image: np.ndarray,
         first_mm: np.ndarray,
         settings: CorrectionSettings,
     ):
-        """`first_picture` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
+        """`first_image` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
         self.triangles, self.camera, self.settings = model.triangles, camera, settings
         self.face_vertices = model.regions["face"]
         self.rigid = model.regions["rigid"]
         self.face = compared_triangles(model)
         crop = self._crop(first_mm[None])
-        picture = crop.picture(first_picture)
-        self.first = FirstFrame(picture, crop.camera, first_mm, self.triangles)
+        image = crop.image(first_image)
+        self.first = FirstFrame(image, crop.camera, first_mm, self.triangles)
 
-    def correct(self, pictures: list[np.ndarray], meshes_mm: np.ndarray) -> CorrectedFrame:
+    def correct(self, images: list[np.ndarray], meshes_mm: np.ndarray) -> CorrectedFrame:
         """Correct the middle mesh.
 
         Args:
-            pictures: three linear pictures (h, w, 3): of t, t + 1, t - 1; at an end of the take, t
+            images: three linear images (h, w, 3): of t, t + 1, t - 1; at an end of the take, t
                 stands in for what is missing.
             meshes_mm: (3, V, 3) world, in the same order.
         """
         meshes = np.asarray(meshes_mm, dtype=np.float64)
         crop = self._crop(meshes)
-        true = [crop.picture(picture) for picture in pictures]
+        true = [crop.image(image) for image in images]
         synthetic = [self._draw(crop.camera, m, p) for m, p in zip(meshes, true, strict=True)]
         frames = SixFrames(
-            np.stack([p for s, f in zip(synthetic, true, strict=True) for p in (s.picture, f)]),
+            np.stack([p for s, f in zip(synthetic, true, strict=True) for p in (s.image, f)]),
             np.stack([s.mask for s in synthetic]),
             np.stack([motion_px(synthetic[0], crop.camera, m, self.triangles) for m in meshes[1:]]),
         )

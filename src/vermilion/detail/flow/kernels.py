@@ -1,7 +1,7 @@
 """Loops of the six-frame flow: data terms assembled, flows relaxed.
 
 The unknowns of a pixel are five flows, w_1 to w_5 (numbered from 0 here). A point x of the reference
-has a place in each of six pictures, x plus a sum of flows; a data term joins two pictures.
+has a place in each of six images, x plus a sum of flows; a data term joins two images.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-#: Pictures: synthetic and true at t, at t + 1, at t - 1; which flows lead from x to the place in each.
+#: Images: synthetic and true at t, at t + 1, at t - 1; which flows lead from x to the place in each.
 PLACES = np.array(
     [
         [0, 0, 0, 0, 0],
@@ -46,11 +46,11 @@ def _sample(maps, x, y, out):
 
 
 @numba.njit(cache=True, fastmath=True, error_model="numpy")
-def assemble(pictures, masks, flows, places, terms, gradient_weight, epsilon, system, right):
+def assemble(images, masks, flows, places, terms, gradient_weight, epsilon, system, right):
     """Linearise the data terms of Mono13 eq. 9 about `flows` (lagged robust weights).
 
     Args:
-        pictures: (6, h, w, 18) channels; masks: (6, h, w, 1) float32, 1 where they may be compared.
+        images: (6, h, w, 18) channels; masks: (6, h, w, 1) float32, 1 where they may be compared.
         flows: (h, w, 5, 2) px.
         gradient_weight: worth of gradient constancy against that of colours.
         system: (h, w, 10, 10), right: (h, w, 10), filled: the increments fulfil system d = right.
@@ -73,7 +73,7 @@ def assemble(pictures, masks, flows, places, terms, gradient_weight, epsilon, sy
                     px += places[i, f] * flows[y, x, f, 0]
                     py += places[i, f] * flows[y, x, f, 1]
                 usable[i] = (
-                    _sample(pictures[i], px, py, values[i])
+                    _sample(images[i], px, py, values[i])
                     and _sample(masks[i], px, py, mask[i])
                     and mask[i, 0] > 0.9
                 )

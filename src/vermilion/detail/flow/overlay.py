@@ -18,7 +18,7 @@ _OPACITY = 0.45
 
 
 def draw_checkerboard(
-    picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
+    image: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
 ) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with the face in squares of the model's texture coordinates."""
     hits = RayCaster(vertices_mm, model.triangles).see(camera)
@@ -27,11 +27,11 @@ def draw_checkerboard(
     face = model.regions["face"][model.triangles].all(axis=1)[np.maximum(hits.triangle, 0)]
     colour = np.where(dark[..., None], np.array([30.0, 60, 160]), np.array([255.0, 240, 150]))
     opacity = (hits.hit & face)[..., None] * _OPACITY
-    return np.rint(picture * (1 - opacity) + colour * opacity).astype(np.uint8)
+    return np.rint(image * (1 - opacity) + colour * opacity).astype(np.uint8)
 
 
 def checkerboard_sheet(
-    read_picture: Callable[[int], np.ndarray],
+    read_image: Callable[[int], np.ndarray],
     camera: Camera,
     model: FaceModel,
     frames: Sequence[int],
@@ -39,17 +39,17 @@ def checkerboard_sheet(
     after_mm: np.ndarray,
     count: int,
 ) -> np.ndarray:
-    """Some frames, a row each: the picture, then the coarse (F, V, 3) and the corrected meshes."""
+    """Some frames, a row each: the image, then the coarse (F, V, 3) and the corrected meshes."""
     tiles = []
     for index in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)):
         frame = int(frames[index])
         try:
-            picture = to_display(read_picture(frame))
+            image = to_display(read_image(frame))
         except InputError:
-            picture = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+            image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
         place = camera.project(before_mm[index])
-        tiles.append(label(cut_to(picture, place), f"{frame}"))
+        tiles.append(label(cut_to(image, place), f"{frame}"))
         for name, mesh in (("coarse", before_mm[index]), ("corrected", after_mm[index])):
-            drawn = draw_checkerboard(picture, camera, mesh, model)
+            drawn = draw_checkerboard(image, camera, mesh, model)
             tiles.append(label(cut_to(drawn, place), f"{frame} {name}"))
     return tile(tiles, 3)

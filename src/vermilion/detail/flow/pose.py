@@ -22,7 +22,7 @@ def rigid_motion(
     focal_px: float = 1.0,
     iterations: int = 8,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) that carry points to their new places in the picture.
+    """Rotation (3, 3) and translation (3,) that carry points to their new places in the image.
 
     Gauss-Newton with robust weights (Cauchy). Motion in depth is hardly seen, so it has a prior.
 

@@ -1,4 +1,4 @@
-"""Temporally coherent corrective flow of one frame, from six pictures (Mono13 7.1, eq. 9)."""
+"""Temporally coherent corrective flow of one frame, from six images (Mono13 7.1, eq. 9)."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ class FlowSettings:
 
 @dataclass(frozen=True)
 class SixFrames:
-    """Pictures about a frame t.
+    """Images about a frame t.
 
     Attributes:
-        pictures: (6, h, w, 3) float32 display values: synthetic and true at t, t + 1, t - 1.
+        images: (6, h, w, 3) float32 display values: synthetic and true at t, t + 1, t - 1.
         masks: (3, h, w) bool, textured face of the synthetic ones.
         motion: (2, h, w, 2) px, motion of the synthetic points to t + 1 and t - 1, to start from.
     """
 
-    pictures: np.ndarray
+    images: np.ndarray
     masks: np.ndarray
     motion: np.ndarray
 
@@ -57,7 +57,7 @@ def corrective_flow(frames: SixFrames, settings: FlowSettings) -> np.ndarray:
     All five flows are found together, coarse to fine; w_2 and w_4 start from the mesh's motion, the
     others from nothing.
     """
-    height, width = frames.pictures.shape[1:3]
+    height, width = frames.images.shape[1:3]
     flows = np.zeros((height, width, 5, 2), dtype=np.float32)
     flows[:, :, 1], flows[:, :, 3] = frames.motion
     masks = np.ones((6, height, width), dtype=np.float32)
@@ -66,7 +66,7 @@ def corrective_flow(frames: SixFrames, settings: FlowSettings) -> np.ndarray:
     flows = _resized_flow(flows, sizes[-1])
     for size in reversed(sizes):
         flows = _resized_flow(flows, size)
-        _solve_level(*_at_size(frames.pictures, masks, size), flows, settings)
+        _solve_level(*_at_size(frames.images, masks, size), flows, settings)
     return np.ascontiguousarray(flows[:, :, 0])
 
 
@@ -78,21 +78,21 @@ def pyramid_sizes(height: int, width: int) -> list[tuple[int, int]]:
     return sizes
 
 
-def _at_size(pictures, masks, size):
-    if pictures.shape[1:3] != size:
+def _at_size(images, masks, size):
+    if images.shape[1:3] != size:
         shape = (size[1], size[0])
-        pictures = np.stack([cv2.resize(p, shape, interpolation=cv2.INTER_AREA) for p in pictures])
+        images = np.stack([cv2.resize(p, shape, interpolation=cv2.INTER_AREA) for p in images])
         masks = np.stack([cv2.resize(m, shape, interpolation=cv2.INTER_AREA) for m in masks])
     # Derivatives at the rim of the texture mix in what lies behind.
     inner = [cv2.erode((m > 0.9).astype(np.float32), np.ones((3, 3)), borderValue=1) for m in masks]
-    return pictures, np.stack(inner)[..., None]
+    return images, np.stack(inner)[..., None]
 
 
-def _solve_level(pictures, masks, flows, settings):
+def _solve_level(images, masks, flows, settings):
     """Improve (h, w, 5, 2) flows in place."""
     height, width = flows.shape[:2]
-    maps = np.stack([channels(picture) for picture in pictures])
-    direction = structure(pictures[0])
+    maps = np.stack([channels(image) for image in images])
+    direction = structure(images[0])
     alpha = np.asarray(settings.smoothness, dtype=np.float32)
     similarity = np.array([0, 0, settings.similarity, 0, settings.similarity], dtype=np.float32)
     system = np.empty((height, width, 10, 10), dtype=np.float32)

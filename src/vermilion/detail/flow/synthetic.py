@@ -20,13 +20,13 @@ _LEAST_FACING = 0.2
 
 
 class FirstFrame:
-    """The picture that textures the mesh, and the mesh as it was then."""
+    """The image that textures the mesh, and the mesh as it was then."""
 
     def __init__(
-        self, picture: np.ndarray, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray
+        self, image: np.ndarray, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray
     ):
-        """`picture` (h, w, 3) float32 is `camera`'s, `vertices_mm` (V, 3) in the world."""
-        self.picture, self.camera = picture, camera
+        """`image` (h, w, 3) float32 is `camera`'s, `vertices_mm` (V, 3) in the world."""
+        self.image, self.camera = image, camera
         self.vertices_mm = np.asarray(vertices_mm, dtype=np.float64)
         caster = RayCaster(self.vertices_mm, triangles)
         towards = camera.centre_mm - self.vertices_mm
@@ -40,7 +40,7 @@ class FirstFrame:
         pixels = self.camera.project(interpolate(hits, triangles, self.vertices_mm))
         places = np.where(hits.hit[..., None], np.nan_to_num(pixels), 0).astype(np.float32) - 0.5
         colours = cv2.remap(
-            self.picture, places, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+            self.image, places, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
         return colours, hits.hit & (interpolate(hits, triangles, self._seen) > 0.99)
 
@@ -50,12 +50,12 @@ class SyntheticFrame:
     """What the camera would see if the mesh were right.
 
     Attributes:
-        picture: (h, w, 3) float32 display values; the true picture where there is no texture.
+        image: (h, w, 3) float32 display values; the true image where there is no texture.
         mask: (h, w) bool, textured face.
         hits: what the pixels show.
     """
 
-    picture: np.ndarray
+    image: np.ndarray
     mask: np.ndarray
     hits: Hits
 
@@ -72,14 +72,14 @@ def synthesise(
 
     Args:
         vertices_mm: (V, 3) in the world.
-        face: (T,) bool, triangles that may be compared with the picture.
+        face: (T,) bool, triangles that may be compared with the image.
         behind: (h, w, 3) what is shown where there is no texture.
     """
     hits = RayCaster(vertices_mm, triangles).see(camera)
     colours, known = first.colours(hits, triangles)
     mask = known & face[np.maximum(hits.triangle, 0)]
-    picture = np.where(mask[..., None], colours, behind).astype(np.float32)
-    return SyntheticFrame(picture, mask, hits)
+    image = np.where(mask[..., None], colours, behind).astype(np.float32)
+    return SyntheticFrame(image, mask, hits)
 
 
 def motion_px(
@@ -91,6 +91,6 @@ def motion_px(
     return np.where(frame.hits.hit[..., None], np.nan_to_num(motion), 0).astype(np.float32)
 
 
-def photometric_residual(frame: SyntheticFrame, picture: np.ndarray, mask: np.ndarray) -> float:
-    """Mean absolute difference to the picture over a mask, display values 0 to 255; NaN if empty."""
-    return float(np.abs(frame.picture - picture)[mask].mean()) if mask.any() else float("nan")
+def photometric_residual(frame: SyntheticFrame, image: np.ndarray, mask: np.ndarray) -> float:
+    """Mean absolute difference to the image over a mask, display values 0 to 255; NaN if empty."""
+    return float(np.abs(frame.image - image)[mask].mean()) if mask.any() else float("nan")

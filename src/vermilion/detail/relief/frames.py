@@ -11,7 +11,7 @@ import numpy as np
 from vermilion.detail.relief.combine import combine
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.relief import ReliefSettings, solve_relief
-from vermilion.detail.relief.sight import FacePicture, Sight
+from vermilion.detail.relief.sight import FaceImage, Sight
 from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
@@ -30,14 +30,14 @@ class Scene:
 
     Attributes:
         topology, camera: of the take.
-        read_picture: frame -> linear (h, w, 3), or InputError.
+        read_image: frame -> linear (h, w, 3), or InputError.
         read_mesh: frame -> (V, 3) mm in the world, before the refinement.
         face_px: a larger face is reduced to this.
     """
 
     topology: FineTopology
     camera: Camera
-    read_picture: Callable[[int], np.ndarray]
+    read_image: Callable[[int], np.ndarray]
     read_mesh: Callable[[int], np.ndarray]
     face_px: int
 
@@ -55,21 +55,19 @@ class Scene:
             path, row = places[frame]
             return read_sequence(path)[row]
 
-        def read_picture(frame):
+        def read_image(frame):
             return frames.read(camera.name, frame)
 
-        return cls(topology, camera, read_picture, read_mesh, cfg["detail.shading.face_px"])
+        return cls(topology, camera, read_image, read_mesh, cfg["detail.shading.face_px"])
 
     def fine(self, frame: int) -> np.ndarray:
         """Smooth fine mesh (V', 3)."""
         return self.topology.refine(self.read_mesh(frame))
 
     def sight(self, frame: int, fine_mm: np.ndarray) -> Sight:
-        """Raises InputError without a picture, ValueError where the face is not in it."""
-        picture, skin = self.read_picture(frame), fine_mm[self.topology.skin_ids]
-        return FacePicture.of(picture, self.camera, skin, self.face_px).sight(
-            fine_mm, self.topology
-        )
+        """Raises InputError without an image, ValueError where the face is not in it."""
+        image, skin = self.read_image(frame), fine_mm[self.topology.skin_ids]
+        return FaceImage.of(image, self.camera, skin, self.face_px).sight(fine_mm, self.topology)
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def relief_of(
         fine = scene.fine(frame)
         try:
             sight = scene.sight(frame, fine)
-        except (InputError, ValueError) as error:  # no picture, or the face is not in it
+        except (InputError, ValueError) as error:  # no image, or the face is not in it
             reasons[row] = f"no relief: {error}"
             continue
         skin = fine[topology.skin_ids]
@@ -173,7 +171,7 @@ def refined(
 def errors_of(
     topology: FineTopology, light: ClipLight, sight: Sight, fine_mm: np.ndarray, camera: Camera
 ) -> np.ndarray:
-    """Absolute difference (Q,) of the picture to the shaded mesh, display values; NaN unseen."""
+    """Absolute difference (Q,) of the image to the shaded mesh, display values; NaN unseen."""
     normals = triangle_normals(fine_mm[topology.skin_ids], topology.skin) @ camera.rotation.T
     error = np.abs(sight.colours - light.values(normals)).mean(axis=1)
     return np.where(sight.trust * (light.seen > 0) > 0, error, np.nan)

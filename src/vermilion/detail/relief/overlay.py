@@ -1,4 +1,4 @@
-"""Pictures of the relief: frame, smooth mesh, refined mesh, what is left unexplained."""
+"""Images of the relief: frame, smooth mesh, refined mesh, what is left unexplained."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WORST = 40.0  # display values at the hottest colour
 
 def relief_panels(
     name: str,
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     topology: FineTopology,
     smooth_mm: np.ndarray,
@@ -25,10 +25,10 @@ def relief_panels(
     """Four panels (480, 480, 3) uint8 of a frame.
 
     Args:
-        picture: (h, w, 3) linear; smooth_mm, refined_mm: (V', 3) in the world.
+        image: (h, w, 3) linear; smooth_mm, refined_mm: (V', 3) in the world.
         errors: (Q,) of the skin's triangles, display values (dark 0, red 40); NaN is grey.
     """
-    shown, place = to_display(picture), camera.project(refined_mm)
+    shown, place = to_display(image), camera.project(refined_mm)
     of = np.full(len(topology.triangles), -1)
     of[topology.skin_of] = np.arange(len(topology.skin_of))
     hits = RayCaster(refined_mm, topology.triangles).see(camera)

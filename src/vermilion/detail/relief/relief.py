@@ -1,4 +1,4 @@
-"""Relief of one frame: displacements along the normals whose shading explains the picture's detail."""
+"""Relief of one frame: displacements along the normals whose shading explains the image's detail."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def solve_relief(
         inner = facing @ world_to_camera.T
         error = detail((sight.colours - light.values(inner)).mean(axis=1))
         if scale is None:
-            # Relief is rare: what is off everywhere is a mesh that lies badly on the picture.
+            # Relief is rare: what is off everywhere is a mesh that lies badly on the image.
             scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
             sigma = sigma * scale
         slope = light.slopes(inner) @ world_to_camera

@@ -1,4 +1,4 @@
-"""What a picture shows at the triangles of the skin."""
+"""What an image shows at the triangles of the skin."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class FacePicture:
-    """The picture about the face.
+class FaceImage:
+    """The image about the face.
 
     Attributes:
         values: (h, w, 3) float32 display values 0 to 255, softened.
@@ -47,9 +47,9 @@ class FacePicture:
 
     @classmethod
     def of(cls, linear: np.ndarray, camera: Camera, skin_mm: np.ndarray, most_px: int):
-        """From a linear picture (h, w, 3); the face reduced to `most_px`; ValueError if not in it."""
+        """From a linear image (h, w, 3); the face reduced to `most_px`; ValueError if not in it."""
         crop = Crop.around(camera, camera.project(skin_mm), _MARGIN, most_px)
-        return cls(cv2.GaussianBlur(crop.picture(linear), (0, 0), 0.8), crop.camera)
+        return cls(cv2.GaussianBlur(crop.image(linear), (0, 0), 0.8), crop.camera)
 
     def colours(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Display values (N, 3) at points (N, 3) in the world, and whether they are in it (N,)."""

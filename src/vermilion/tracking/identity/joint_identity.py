@@ -1,14 +1,14 @@
-"""Who it is, from landmarks and pictures together: shape, albedo and light (Lips16 3.2).
+"""Who it is, from landmarks and images together: shape, albedo and light (Lips16 3.2).
 
 Minimises, over identity, landmark offsets, unknown focal lengths and the poses and weights of a
 few frames of all takes, the energy of the landmarks (`tracking.identity`) and, with a light and an
 albedo for each take,
 
-    strength * mean over visible samples of rho(|display(picture) - display(albedo * SH(normal))|)
+    strength * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + how far the albedo is from the skin's one colour
 
 The albedo of each sample is eliminated: held, it would hold the shape that it was estimated under.
-Light, visibility and the pictures' resolution are held for a round of steps, then found again.
+Light, visibility and the images' resolution are held for a round of steps, then found again.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ from vermilion.tracking.landmark_fit.shape import growth, landmark_identities, l
 
 
 @dataclass(frozen=True)
-class PictureSettings:
-    """How much the pictures count.
+class IdentityImageSettings:
+    """How much the images count.
 
     Attributes:
         spacing_mm: between samples of the skin.
-        pixel_mm: of the pictures that are compared.
+        pixel_mm: of the images that are compared.
         sigma: deviation of a colour, display values (0 to 255).
         robust_sigmas: a sample this many deviations off counts half (Cauchy).
         strength: how many independent samples a face is worth.
@@ -66,7 +66,7 @@ class PictureSettings:
 
 @dataclass(frozen=True)
 class JointFit:
-    """The person, and what the pictures show of them before and after.
+    """The person, and what the images show of them before and after.
 
     Attributes:
         person: identity, landmark offsets, focal lengths.
@@ -108,21 +108,21 @@ class _Colours:
 def fit_joint_identity(
     model: FaceModel,
     problem: IdentityProblem,
-    pictures: Sequence[np.ndarray],
+    images: Sequence[np.ndarray],
     cameras: Sequence[Camera],
-    settings: PictureSettings,
+    settings: IdentityImageSettings,
 ) -> JointFit:
     """One person from frames of their takes.
 
     Args:
         problem: the landmarks of F frames.
-        pictures: F of (h, w, 3) linear RGB; cameras: theirs.
+        images: F of (h, w, 3) linear RGB; cameras: theirs.
     """
     frames, shared = problem.solve()
     looks = []
     samples = sample_skin(model, settings.spacing_mm)
     for turn in range(settings.rounds):
-        held = _Round(model, problem, samples, pictures, cameras, settings, frames, shared)
+        held = _Round(model, problem, samples, images, cameras, settings, frames, shared)
         if turn == 0:
             looks.append(held.residuals(frames, shared))
         frames, shared = descend(held, frames, shared, settings.iterations)
@@ -135,7 +135,7 @@ def fit_joint_identity(
 class _Round:
     """The energy with light, visibility and resolution as one state has them."""
 
-    def __init__(self, model, problem, samples, pictures, cameras, settings, frames, shared):
+    def __init__(self, model, problem, samples, images, cameras, settings, frames, shared):
         self.problem, self.samples, self.settings = problem, samples, settings
         self.n_identity = problem.n_identity
         self.centre = shared[: self.n_identity].copy()
@@ -146,7 +146,7 @@ class _Round:
         self.face = SampledFace.of(model, neutral, samples, shapes)
         self.levels: list[Level] = []
         self.trust = np.zeros((len(frames), len(samples)))
-        for index, (row, picture) in enumerate(zip(frames, pictures, strict=True)):
+        for index, (row, image) in enumerate(zip(frames, images, strict=True)):
             rotation = rotation_of(row[:3]) @ problem.reference
             weights = self._weights(row, shared)
             points = self.face.points(weights) @ rotation.T + row[3:6]
@@ -154,7 +154,7 @@ class _Round:
             shape = neutral + np.tensordot(row[N_POSE:], model.expressions_mm, axes=1)
             mesh = shape @ rotation.T + row[3:6]
             self.trust[index] = visible_trust(model, mesh, points, normals)
-            self.levels += levels_of(picture, cameras[index], points, settings.pixel_mm, 1)
+            self.levels += levels_of(image, cameras[index], points, settings.pixel_mm, 1)
         self.lights = [self._light(rows, frames, shared) for rows in self.takes]
 
     def _weights(self, row: np.ndarray, shared: np.ndarray) -> np.ndarray:
@@ -225,7 +225,7 @@ class _Round:
         matrix[first:, first:] = known.system
         gradient[:first], gradient[first:] = known.frame_gradient.ravel(), known.shared_gradient
         for take, (rows, light) in enumerate(zip(self.takes, self.lights, strict=True)):
-            self._add_pictures(matrix, gradient, take, rows, light, frames, shared)
+            self._add_images(matrix, gradient, take, rows, light, frames, shared)
         held = pressed(frames, gradient[:first].reshape(frames.shape))
         free = np.concatenate([~held.ravel(), np.ones(len(shared), dtype=bool)])
         system = matrix[np.ix_(free, free)]
@@ -234,14 +234,14 @@ class _Round:
         step[free] = -np.linalg.solve(system, gradient[free])
         return step[:first].reshape(frames.shape), step[first:]
 
-    def _add_pictures(self, matrix, gradient, take, rows, light, frames, shared):
-        """Adds the pictures of a take to the system (P, P) and its gradient (P,)."""
+    def _add_images(self, matrix, gradient, take, rows, light, frames, shared):
+        """Adds the images of a take to the system (P, P) and its gradient (P,)."""
         looks = [self._look(index, frames, shared) for index in rows]
         found = self._colours(looks, light)
         limit = 3 * (self.settings.sigma * self.settings.robust_sigmas) ** 2
         weights = found.weights / (1 + (found.errors**2).sum(axis=2) / limit)
         size, first = frames.shape[1], frames.size
-        # Columns of the shared unknowns that pictures tell of: identity, and the take's focal length.
+        # Columns of the shared unknowns that images tell of: identity, and the take's focal length.
         focal = first + len(shared) - len(self.problem.guess) + self.problem.take[rows[0]]
         common = np.append(np.arange(first, first + self.n_identity), focal)
         curvature = (weights[..., None] * found.by_albedo**2).sum(axis=0) + found.prior

@@ -19,7 +19,7 @@ def ablation_rows(table: pd.DataFrame) -> pd.DataFrame:
     """A row a take and step, in the order they come: mean residual, display values (0 to 255).
 
     Residuals compare within a basis only: what the mesh is coloured with before it is compared with
-    the picture (`BASES`). `held_out` counts only frames that the appearance was not learnt from (NaN where there are none).
+    the image (`BASES`). `held_out` counts only frames that the appearance was not learnt from (NaN where there are none).
 
     Args:
         table: columns subject, take, step, frame, residual, and learnt_from (0 or 1) where known.

@@ -1,8 +1,8 @@
-"""Pose and expression of one frame from its picture (Lips16 3.2): Gauss-Newton, coarse to fine.
+"""Pose and expression of one frame from its image (Lips16 3.2): Gauss-Newton, coarse to fine.
 
 Minimises, over the rotation, the translation and the weights w in [0, 1],
 
-    strength * mean over visible samples of rho(|display(picture) - display(albedo * SH(normal))|)
+    strength * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + the landmark terms and |w|^2 / weight_sigma^2 of the landmark fit
     + |x - x_landmarks|^2 over how far a track may be moved
 """
@@ -30,7 +30,7 @@ from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, ro
 
 @dataclass(frozen=True)
 class PhotometricSettings:
-    """How much the picture counts.
+    """How much the image counts.
 
     Attributes:
         sigma: deviation of a colour, display values (0 to 255).
@@ -57,7 +57,7 @@ class View:
     """One frame: what the model is compared with.
 
     Attributes:
-        levels: the picture, finest first.
+        levels: the image, finest first.
         focal_px: of the ideal pinhole.
         trust: (N,) of each sample in this frame, zero where hidden.
         landmarks: the frame's landmark term.
@@ -127,7 +127,7 @@ class FrameProblem:
         x, counts = view.start, self.settings.iterations
         none = np.zeros((0, len(x)))
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
-            # Coarse pictures need fewer samples.
+            # Coarse images need fewer samples.
             part = self._part(view, 2**level)
             cost = self._cost(x, view, level, part)
             for _ in range(count):
@@ -155,7 +155,7 @@ class FrameProblem:
         return _Part(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
 
     def _errors(self, x, view, level, part):
-        """Picture less model in display values (n, 3), what they came from, and trust (n,)."""
+        """Image less model in display values (n, 3), what they came from, and trust (n,)."""
         rotation = rotation_of(x[:3]) @ view.reference
         turned = part.face.points(x[N_POSE:]) @ rotation.T
         points = turned + x[3:6]

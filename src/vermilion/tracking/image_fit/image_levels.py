@@ -1,4 +1,4 @@
-"""A picture about the face at a few coarse resolutions, sampled between its pixels."""
+"""An image about the face at a few coarse resolutions, sampled between its pixels."""
 
 from __future__ import annotations
 
@@ -51,19 +51,19 @@ class Level:
 
 
 def levels_of(
-    picture: np.ndarray,
+    image: np.ndarray,
     camera: Camera,
     points_mm: np.ndarray,
     pixel_mm: float,
     count: int,
 ) -> list[Level]:
-    """The picture round points in the camera frame, finest level first.
+    """The image round points in the camera frame, finest level first.
 
     Args:
-        picture: (h, w, 3) linear RGB.
+        image: (h, w, 3) linear RGB.
         points_mm: (N, 3) in the camera frame.
         pixel_mm: size of a pixel of the finest level at the points' mean depth; never finer than
-            the picture itself.
+            the image itself.
         count: of levels, each half as fine as the one before.
     """
     focal = focal_px(camera)
@@ -71,7 +71,7 @@ def levels_of(
     places = focal * points_mm[:, :2] / points_mm[:, 2:3]
     margin = focal * _MARGIN_MM / depth
     low, high = places.min(axis=0) - margin, places.max(axis=0) + margin
-    flat, origin, size = _ideal(picture, camera, low, high)
+    flat, origin, size = _ideal(image, camera, low, high)
     wanted = max(focal * pixel_mm / depth, 1.0)
     levels = []
     for index in range(count):
@@ -93,8 +93,8 @@ def levels_of(
 _AXES = ((1, 0), (0, 1))
 
 
-def _ideal(picture, camera, low, high):
-    """The part of the picture between two corners (pixels from the principal point).
+def _ideal(image, camera, low, high):
+    """The part of the image between two corners (pixels from the principal point).
 
     Returns it with its corner and its size in such pixels.
     """
@@ -102,19 +102,19 @@ def _ideal(picture, camera, low, high):
     squeeze = np.array([1.0, k[1, 1] / k[0, 0]])
     centre = k[:2, 2]
     if not camera.is_pinhole:
-        picture = _undistorted(picture, camera)
-    height, width = picture.shape[:2]
+        image = _undistorted(image, camera)
+    height, width = image.shape[:2]
     first = np.clip(np.floor(low * squeeze + centre), 0, [width - 8, height - 8]).astype(int)
     last = np.clip(np.ceil(high * squeeze + centre), first + 8, [width, height]).astype(int)
-    part = picture[first[1] : last[1], first[0] : last[0]]
+    part = image[first[1] : last[1], first[0] : last[0]]
     return part, (first - centre) / squeeze, (last - first) / squeeze
 
 
-def _undistorted(picture: np.ndarray, camera: Camera) -> np.ndarray:
-    """The picture of the ideal pinhole camera with the same calibration matrix."""
+def _undistorted(image: np.ndarray, camera: Camera) -> np.ndarray:
+    """The image of the ideal pinhole camera with the same calibration matrix."""
     k = camera.calibration
     normal = (camera.pixel_grid() - k[:2, 2]) / [k[0, 0], k[1, 1]]
     rays = np.concatenate([normal, np.ones((*normal.shape[:2], 1))], axis=-1)
     world = (rays - camera.translation) @ camera.rotation
     place = (camera.project(world) - 0.5).astype(np.float32)
-    return cv2.remap(picture, place[..., 0], place[..., 1], cv2.INTER_LINEAR)
+    return cv2.remap(image, place[..., 0], place[..., 1], cv2.INTER_LINEAR)

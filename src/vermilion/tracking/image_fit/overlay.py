@@ -1,4 +1,4 @@
-"""Pictures of the refinement: what was estimated, and what is left unexplained."""
+"""Images of the refinement: what was estimated, and what is left unexplained."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def to_vertices(
     return np.where(weight[:, None] > 1e-6, mean, total)
 
 
-def appearance_picture(
-    picture: np.ndarray, start: TakeStart, x: np.ndarray, appearance: Appearance
+def appearance_image(
+    image: np.ndarray, start: TakeStart, x: np.ndarray, appearance: Appearance
 ) -> np.ndarray:
-    """Picture, model, albedo and light side by side, (h, w, 3) uint8.
+    """Image, model, albedo and light side by side, (h, w, 3) uint8.
 
     Args:
-        picture: (h, w, 3) linear; x: (6 + K,) of its frame.
+        image: (h, w, 3) linear; x: (6 + K,) of its frame.
     """
     camera, triangles = start.camera, start.model.triangles
     local = start.vertices(x)
@@ -54,8 +54,8 @@ def appearance_picture(
         len(local),
     )  # fmt: skip
     albedo = interpolate(hits, triangles, vertices)
-    place, original = camera.project(world), to_display(picture)
-    panels = [label(cut_to(original, place), "picture")]
+    place, original = camera.project(world), to_display(image)
+    panels = [label(cut_to(original, place), "image")]
     for name, colours in (("model", albedo * light), ("albedo", albedo), ("light", 0.5 * light)):
         shown = np.where(hits.hit[..., None], to_display(colours), original)
         panels.append(label(cut_to(shown, place), name))
@@ -65,33 +65,33 @@ def appearance_picture(
 def residual_sheet(
     rows: Sequence[tuple[str, np.ndarray, Sequence[tuple]]], camera: Camera
 ) -> np.ndarray:
-    """A row a frame, a column a step: the picture, and the error at every sample by its colour.
+    """A row a frame, a column a step: the image, and the error at every sample by its colour.
 
     Args:
-        rows: (name, picture (h, w, 3) linear, [(label, errors (N, 3), trust (N,), place (N, 2))]);
+        rows: (name, image (h, w, 3) linear, [(label, errors (N, 3), trust (N,), place (N, 2))]);
             places in pixels from the principal point of the ideal pinhole.
-        camera: of the pictures.
+        camera: of the images.
     """
     if not rows:
         return np.zeros((64, 256, 3), dtype=np.uint8)
     k = camera.calibration
     squeeze = np.array([1.0, k[1, 1] / k[0, 0]])
     panels = []
-    for name, picture, results in rows:
-        original = to_display(picture)
+    for name, image, results in rows:
+        original = to_display(image)
         points = results[0][3] * squeeze + k[:2, 2]
         panels.append(label(cut_to(original, points), name))
         for text, errors, trust, place in results:
             panels.append(
                 label(
-                    _error_picture(original, points, errors, trust, place * squeeze + k[:2, 2]),
+                    _error_image(original, points, errors, trust, place * squeeze + k[:2, 2]),
                     text,
                 )
             )
     return tile(panels, 1 + len(rows[0][2]))
 
 
-def _error_picture(original, points, errors, trust, place):
+def _error_image(original, points, errors, trust, place):
     seen = np.flatnonzero(trust > 0)
     colours = np.rint(255 * colour_map(np.abs(errors[seen]).mean(axis=1), 0.0, _WORST))
     extent = points.max(axis=0) - points.min(axis=0)

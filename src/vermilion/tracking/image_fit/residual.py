@@ -1,4 +1,4 @@
-"""How well the model explains a picture: what every refinement must lower."""
+"""How well the model explains an image: what every refinement must lower."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def sample_errors(
     appearance: Appearance,
     offsets_mm: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Picture less model at each sample, in display values (0 to 255).
+    """Image less model at each sample, in display values (0 to 255).
 
     Args:
         x: (6 + K,) pose and weights, about the view's reference.

@@ -45,7 +45,7 @@ class TakeStart:
     Attributes:
         model: the tracker's.
         identity: of the person.
-        camera: of the pictures, with the focal length that was used.
+        camera: of the images, with the focal length that was used.
         x: (F, 6 + K) the landmark fit: rotation vector about `reference`, translation, weights.
         reference: (3, 3).
         seen: landmarks of the F frames.
@@ -135,15 +135,15 @@ class TakeStart:
         )
 
     def view(
-        self, row: int, picture: np.ndarray, face: SampledFace, pixel_mm: float, levels: int
+        self, row: int, image: np.ndarray, face: SampledFace, pixel_mm: float, levels: int
     ) -> View:
-        """What the refinement of one frame needs, from its picture (h, w, 3) linear."""
+        """What the refinement of one frame needs, from its image (h, w, 3) linear."""
         x, focal = self.x[row], focal_px(self.camera)
         rotation = rotation_of(x[:3]) @ self.reference
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
         return View(
-            levels_of(picture, self.camera, points, pixel_mm, levels),
+            levels_of(image, self.camera, points, pixel_mm, levels),
             focal,
             visible_trust(self.model, self.vertices(x), points, normals),
             LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
@@ -186,7 +186,7 @@ def learn_appearance(
 def readable(
     valid: np.ndarray, read: Callable[[int], np.ndarray], name: str
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """(row, picture) of the valid rows (F,) bool; those that `read` cannot give are left out.
+    """(row, image) of the valid rows (F,) bool; those that `read` cannot give are left out.
 
     The capture stage has flagged them. Progress is reported under `name`.
     """
@@ -206,7 +206,7 @@ def refine_frames(
 ) -> dict[str, np.ndarray]:
     """Refine the frames of a `TakeStart` one by one.
 
-    Frames that are not valid (F,), or whose picture `read` (row -> linear RGB) cannot give, keep the
+    Frames that are not valid (F,), or whose image `read` (row -> linear RGB) cannot give, keep the
     landmark fit.
 
     Returns:
@@ -220,8 +220,8 @@ def refine_frames(
         "refined": np.zeros(n_frames, dtype=bool),
     }
     levels = len(problem.settings.iterations)
-    for row, picture in readable(valid, read, "photometric refinement"):
-        found = problem.solve(start.view(row, picture, problem.face, pixel_mm, levels))
+    for row, image in readable(valid, read, "photometric refinement"):
+        found = problem.solve(start.view(row, image, problem.face, pixel_mm, levels))
         result["x"][row], result["matrix"][row] = found.x, found.matrix
         result["right"][row], result["refined"][row] = found.right, True
     return result

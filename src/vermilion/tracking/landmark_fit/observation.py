@@ -1,4 +1,4 @@
-"""How a model's landmarks appear in the pictures: residuals, their derivatives, their trust."""
+"""How a model's landmarks appear in the images: residuals, their derivatives, their trust."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rotations, and the pose of known 3D points from their pictures."""
+"""Rotations, and the pose of known 3D points from their images."""
 
 from __future__ import annotations
 

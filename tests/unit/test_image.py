@@ -1,4 +1,4 @@
-"""The picture as a constraint on a corrected mesh: contours, contact, pose, neighbours in time."""
+"""The image as a constraint on a corrected mesh: contours, contact, pose, neighbours in time."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from scipy import sparse
 from tests import lip_patch
 from vermilion.correction.constraints import ConstraintSolver, Rows
 from vermilion.correction.correct import correct_with_layers
-from vermilion.correction.image_agreement import PictureFit
+from vermilion.correction.image_agreement import ImageAgreement
 from vermilion.correction.image_contours import (
-    Picture,
-    PictureSettings,
+    ImageContours,
+    ImageContourSettings,
     frames_around,
 )
 from vermilion.correction.integration import LayerIntegrator
@@ -23,7 +23,7 @@ from vermilion.geometry.rotations import rotation_matrix
 
 N_SAMPLES = 80
 CAMERA = lip_patch.cameras()["front"]
-OFF = PictureSettings(repose=False, contour_weight=0.0, contact=False)
+OFF = ImageContourSettings(repose=False, contour_weight=0.0, contact=False)
 CONTOURS = replace(OFF, contour_weight=1000.0)
 REPOSE = replace(OFF, repose=True)
 
@@ -49,29 +49,29 @@ def integrator():
     return LayerIntegrator(FACE.neutral_mm, FACE.triangles, MASK, seam_mm=0.0)
 
 
-def picture_of(meshes_mm, settings, pose=None):
-    """What a perfect search finds in the pictures of meshes (F, V, 3) in the world."""
+def image_of(meshes_mm, settings, pose=None):
+    """What a perfect search finds in the images of meshes (F, V, 3) in the world."""
     rotation, translation = pose or (np.eye(3), np.zeros(3))
     world = np.asarray(meshes_mm) @ rotation.T + translation
     outer, inner = (CAMERA.project(ring.points(world)) for ring in lip_rings(FACE, N_SAMPLES))
     known = np.ones(outer.shape[:2], dtype=bool)
     frames = np.arange(len(world))
-    return Picture(FACE, CAMERA, frames, outer, inner, known, known, settings)
+    return ImageContours(FACE, CAMERA, frames, outer, inner, known, known, settings)
 
 
-def fitted(corrected, picture, coarse=None, pose=None):
+def fitted(corrected, image, coarse=None, pose=None):
     n = len(corrected)
     rotation, translation = pose or (np.eye(3), np.zeros(3))
     rotation, translation = np.tile(rotation, (n, 1, 1)), np.tile(translation, (n, 1))
     coarse = corrected if coarse is None else coarse
     coarse = coarse @ np.swapaxes(rotation, 1, 2) + translation[:, None]
-    fit = PictureFit.of(integrator(), FACE.neutral_mm, picture)
-    return fit.fit(corrected, coarse, rotation, translation, picture)
+    fit = ImageAgreement.of(integrator(), FACE.neutral_mm, image)
+    return fit.fit(corrected, coarse, rotation, translation, image)
 
 
-def distance_px(mesh_mm, picture, f=0):
+def distance_px(mesh_mm, image, f=0):
     """Distance of the samples of a mesh (V, 3) from their lines, (m,) px, where these are known."""
-    points, normals, known = (part[f] for part in picture.lines())
+    points, normals, known = (part[f] for part in image.lines())
     samples = np.concatenate([ring.points(mesh_mm) for ring in lip_rings(FACE, N_SAMPLES)])
     return np.abs(((CAMERA.project(samples) - points) * normals).sum(axis=1))[known]
 
@@ -118,10 +118,10 @@ def test_a_one_sided_row_never_pulls():
 
 def test_contours_go_to_their_lines_and_depth_stays():
     before = lip_patch.vertices_at(0.6, 0.0)
-    picture = picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
-    after = fitted(before[None], picture)[0]
-    assert distance_px(before, picture).max() > 2.0
-    assert distance_px(after, picture).max() < 0.1
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
+    after = fitted(before[None], image)[0]
+    assert distance_px(before, image).max() > 2.0
+    assert distance_px(after, image).max() < 0.1
     moved = after - before
     lips = np.unique(np.concatenate([FACE.outer_contour, FACE.inner_contour]))
     view = before[lips] - CAMERA.centre_mm
@@ -131,11 +131,9 @@ def test_contours_go_to_their_lines_and_depth_stays():
     )
 
 
-def test_gradients_across_the_picture_stay():
+def test_gradients_across_the_image_stay():
     before = lip_patch.vertices_at(0.6, 0.0)
-    moved = (
-        fitted(before[None], picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS))[0] - before
-    )
+    moved = fitted(before[None], image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS))[0] - before
     edges = FACE.triangles[MASK]
     change = np.abs(moved[edges[:, 1:]] - moved[edges[:, :1]]).mean(axis=(0, 1))
     assert change[:2].min() > 0.01
@@ -144,9 +142,9 @@ def test_gradients_across_the_picture_stay():
 
 def test_points_that_were_not_found_do_not_pull():
     before = lip_patch.vertices_at(0.6, 0.0)
-    picture = picture_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
-    nothing = np.zeros_like(picture.outer_found)
-    blind = replace(picture, outer_found=nothing, inner_found=nothing)
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
+    nothing = np.zeros_like(image.outer_found)
+    blind = replace(image, outer_found=nothing, inner_found=nothing)
     np.testing.assert_allclose(fitted(before[None], blind)[0], before, atol=1e-12)
 
 
@@ -156,8 +154,8 @@ def test_switched_off_the_result_is_that_of_the_paper():
     pose = np.eye(3)[None], np.zeros((1, 3))
     arguments = MASK, layers, before, FACE.triangles, FACE.neutral_mm, *pose
     paper = correct_with_layers(*arguments)
-    off = correct_with_layers(*arguments, picture=picture_of(before, OFF))
-    on = correct_with_layers(*arguments, picture=picture_of(before, CONTOURS))
+    off = correct_with_layers(*arguments, image=image_of(before, OFF))
+    on = correct_with_layers(*arguments, image=image_of(before, CONTOURS))
     assert np.array_equal(off, paper)
     assert not np.allclose(on, paper)
 
@@ -167,30 +165,30 @@ def test_lips_that_pass_through_each_other_are_parted(weight):
     through = lip_patch.vertices_at(-3.0, 0.0)
     assert depth_in_other_lip(through) > 0.3
     settings = replace(OFF, contact=True, contour_weight=weight)
-    after = fitted(through[None], picture_of([through], settings))[0]
+    after = fitted(through[None], image_of([through], settings))[0]
     assert depth_in_other_lip(after) <= 0.01
 
 
-def test_lips_that_touch_in_the_picture_touch_in_the_mesh():
+def test_lips_that_touch_in_the_image_touch_in_the_mesh():
     gap = FACE.inner_contour[[lip_patch.COLUMNS // 4, 3 * lip_patch.COLUMNS // 4]]
     closed, ajar = lip_patch.vertices_at(-2.35, 0.0), lip_patch.vertices_at(0.5, 0.0)
     ajar[FACE.regions["vermilion_upper"], 2] += 1.0  # and one lip before the other
     settings = replace(OFF, contact=True, contour_weight=100.0)
-    after = fitted(ajar[None], picture_of([closed], settings))[0]
+    after = fitted(ajar[None], image_of([closed], settings))[0]
     assert np.linalg.norm(ajar[gap[0]] - ajar[gap[1]]) > 2.5
     assert np.linalg.norm((after[gap[0]] - after[gap[1]])[1:]) < 0.2
     assert depth_in_other_lip(after) <= 0.01
 
 
-def test_a_head_beside_its_picture_is_laid_on_it():
+def test_a_head_beside_its_image_is_laid_on_it():
     mesh = lip_patch.vertices_at(2.0, 0.1)[None]
     pose = rotation_matrix(np.array([0.0, 0.02, 0.01])), np.array([1.0, -1.5, 0.0])
-    picture = picture_of(mesh, REPOSE)
+    image = image_of(mesh, REPOSE)
     rotation, translation = pose
     coarse = (mesh - translation) @ rotation  # its eyes and brows project where they should
-    after = fitted(mesh, picture, coarse=coarse, pose=pose)[0]
-    assert distance_px(mesh[0] @ rotation.T + translation, picture).mean() > 3.0
-    assert distance_px(after, picture).mean() < 0.2
+    after = fitted(mesh, image, coarse=coarse, pose=pose)[0]
+    assert distance_px(mesh[0] @ rotation.T + translation, image).mean() > 3.0
+    assert distance_px(after, image).mean() < 0.2
 
 
 def test_the_filter_over_time_has_no_lag_and_keeps_what_is_steady():
@@ -207,13 +205,13 @@ def test_the_filter_over_time_has_no_lag_and_keeps_what_is_steady():
 
 
 def test_results_do_not_depend_on_the_chunk():
-    settings = PictureSettings(repose_frames=1.0)
+    settings = ImageContourSettings(repose_frames=1.0)
     rng = np.random.default_rng(2)
     shapes = np.stack([lip_patch.vertices_at(o, 0.05) for o in rng.uniform(0, 4, 16)])
-    picture = picture_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)), settings)
-    whole = fitted(shapes, picture)
+    image = image_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)), settings)
+    whole = fitted(shapes, image)
     asked = np.array([5, 6, 7])
     near = frames_around(asked, np.arange(16), 3)
     assert near.tolist() == list(range(2, 11))
-    part = fitted(shapes[near], picture[near])[np.searchsorted(near, asked)]
+    part = fitted(shapes[near], image[near])[np.searchsorted(near, asked)]
     np.testing.assert_allclose(part, whole[asked], rtol=0, atol=1e-9)

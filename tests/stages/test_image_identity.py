@@ -1,4 +1,4 @@
-"""The stage that finds a person in pictures: from files to files."""
+"""The stage that finds a person in images: from files to files."""
 
 import json
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stages.run_script import run_script
-from tests.unit.photometric_scene import CAMERA, mesh_of, motion, picture_of
+from tests.unit.photometric_scene import CAMERA, image_of, mesh_of, motion
 from tests.unit.test_joint_identity import PERSON, model_with_identities
 from vermilion.config.tracking import TrackingConfig
 from vermilion.geometry.camera import write_cameras
@@ -26,7 +26,7 @@ def capture(root):
     offsets = np.tensordot(PERSON, model.identities_mm, axes=1)
     meshes = [mesh_of(model, row, offsets) for row in rows]
     for frame, mesh in enumerate(meshes):
-        write_image(root / f"frames/cam/{frame:06d}.png", picture_of(model, mesh))
+        write_image(root / f"frames/cam/{frame:06d}.png", image_of(model, mesh))
     points = np.stack([CAMERA.project(mesh[model.landmarks]) for mesh in meshes])
     valid = np.arange(N_FRAMES) != 5
     points[5] = np.nan
@@ -48,7 +48,7 @@ def capture(root):
 
 def run(root, inputs, params):
     run_script(
-        "tracking/picture_identity",
+        "tracking/image_identity",
         wildcards={"subject": "s"},
         params=params,
         input=inputs,
@@ -63,12 +63,10 @@ def test_a_person_from_files_with_a_frame_lost(tmp_path):
     assert np.abs(found.identity - PERSON).max() < 0.4
     assert found.takes.tolist() == ["t"]
     height, width = read_image(tmp_path / "identity.png").shape[:2]
-    assert height == pytest.approx(
-        4 / 3 * width, rel=0.2
-    )  # frames down; picture, two errors across
+    assert height == pytest.approx(4 / 3 * width, rel=0.2)  # frames down; image, two errors across
 
 
-def test_a_picture_that_is_gone_is_named(tmp_path):
+def test_a_image_that_is_gone_is_named(tmp_path):
     inputs, params = capture(tmp_path)
     (tmp_path / "frames/cam/000007.png").unlink()
     with pytest.raises(InputError, match="000007"):

@@ -1,4 +1,4 @@
-"""The identity of a subject from landmarks and pictures of sampled frames of its takes."""
+"""The identity of a subject from landmarks and images of sampled frames of its takes."""
 
 from dataclasses import fields
 
@@ -10,7 +10,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.tracking.identity.joint_identity import PictureSettings, fit_joint_identity
+from vermilion.tracking.identity.joint_identity import IdentityImageSettings, fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import IdentityProblem
 from vermilion.tracking.identity.sampling import sample_takes
 from vermilion.tracking.image_fit.overlay import residual_sheet
@@ -18,7 +18,7 @@ from vermilion.tracking.image_fit.residual import photometric_residual
 from vermilion.tracking.result import Identity
 from vermilion.tracking.settings import identity_settings
 
-STEPS = ("landmarks", "with pictures")
+STEPS = ("landmarks", "with images")
 #: Frames of the overlay: no key, as another number would make all that follows the identity again.
 SHOWN = 4
 
@@ -35,25 +35,25 @@ def main(snakemake):
         row["take"]: open_frames(row["source"], subject, row["take"]) for row in params.takes
     }
     wanted = [(part, int(frame)) for part in found for frame in part.frames]
-    pictures = [
+    images = [
         sources[part.sample.name].read(part.camera.name, frame)
-        for part, frame in progress(wanted, "pictures")
+        for part, frame in progress(wanted, "images")
     ]
-    names = {field.name for field in fields(PictureSettings)}
+    names = {field.name for field in fields(IdentityImageSettings)}
     joint = fit_joint_identity(
         tracker,
         IdentityProblem(tracker, samples, identity_settings(cfg["tracking.fit"], options)),
-        pictures,
+        images,
         [part.camera for part, _ in wanted],
-        PictureSettings(**{k: v for k, v in options["pictures"].items() if k in names}),
+        IdentityImageSettings(**{k: v for k, v in options["images"].items() if k in names}),
     )
     sheets, residuals = [], []
-    for (part, frame), picture, states in zip(wanted, pictures, joint.sheet, strict=True):
+    for (part, frame), image, states in zip(wanted, images, joint.sheet, strict=True):
         each = [photometric_residual(errors, trust) for errors, trust, _ in states]
         labels = [f"{step} {value:.2f}" for step, value in zip(STEPS, each, strict=True)]
         row = [(text, *state) for text, state in zip(labels, states, strict=True)]
         residuals.append(each)
-        sheets.append(((f"{part.sample.name} {frame}", picture, row), part.camera))
+        sheets.append(((f"{part.sample.name} {frame}", image, row), part.camera))
     before, after = np.mean(residuals, axis=0)
     fit = joint.person
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
