@@ -29,16 +29,15 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from vermilion.correction.correct import Corrector
-from vermilion.correction.domain import mesh_corners
 from vermilion.correction.image_agreement import ImageAgreement
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.layers import decode_layers
 from vermilion.correction.right_side import LANES, TURN_SERIES, accumulate_mixture, turn_limits
-from vermilion.correspondence.correspondence import topology_hash
 from vermilion.faces.contours import closed_loop, edge_graph
 from vermilion.faces.model import REGIONS, FaceModel
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.mesh import mesh_corners, topology_hash
 from vermilion.regression.estimators import RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import layer_basis

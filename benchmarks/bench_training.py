@@ -17,9 +17,9 @@ import numpy as np
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.model_selection import GroupKFold
 
-from vermilion.database.schema import TrainingSet
 from vermilion.regression.cross_validation import clips_of
 from vermilion.regression.training import Selection, train
+from vermilion.regression.training_set import TrainingSet
 
 N_FRAMES, N_FEATURES, N_TRIANGLES = 3289, 53, 3000
 

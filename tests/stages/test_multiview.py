@@ -25,8 +25,9 @@ from tests.stages.multiview_jobs import (
 )
 from tests.stages.run_script import run_script
 from vermilion.geometry.camera import write_cameras
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import image_size
-from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow

@@ -8,9 +8,10 @@ from tests.stages.test_detail import CAMERA, MODEL, write_take
 from vermilion.appearance.harmonics import irradiance
 from vermilion.config.detail import DetailConfig
 from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.imaging.images import read_channels, read_image
-from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 
 N_FRAMES = 6

@@ -10,9 +10,10 @@ from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
 from vermilion.config.tracking import MeshesConfig, TrackingConfig
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import read_image, write_image
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.result import Identity, TrackedTake
 

@@ -6,15 +6,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.unit.test_integration import sheet
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
-from vermilion.correspondence.correspondence import (
-    Correspondence,
-    find_correspondence,
-    topology_hash,
-)
+from vermilion.correspondence.correspondence import Correspondence, find_correspondence
 from vermilion.correspondence.landmarks import back_project
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.head_frame import align_frames, head_from_world, world_from_head
-from vermilion.geometry.mesh import Mesh, vertex_normals
+from vermilion.geometry.mesh import Mesh, topology_hash, vertex_normals
 from vermilion.geometry.registration import register, similarity_alignment
 from vermilion.geometry.surface_points import (
     SurfaceMap,

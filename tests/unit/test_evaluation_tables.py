@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from vermilion.config.regressors import in_order, kind_of
 from vermilion.evaluation.contour_error import contour_error, distance_to_polyline
 from vermilion.evaluation.corrected import measure_name
 from vermilion.evaluation.errors import ClipSums
@@ -14,7 +15,7 @@ from vermilion.evaluation.held_out import shown_rows
 from vermilion.evaluation.measures import seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.report.page import number, page, spans, table
-from vermilion.report.table1 import in_order, kind_of, table1
+from vermilion.report.table1 import table1
 
 SECONDS = ["subject", "take", "regressor", "seconds_per_frame"]
 

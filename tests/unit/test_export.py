@@ -18,8 +18,8 @@ from vermilion.export.overlay import (
 from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
 from vermilion.export.weights import write_weights
 from vermilion.geometry.camera import pinhole
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.video import VideoReader, write_video
-from vermilion.storage.sequences import read_mesh
 
 
 def sequence(frames: int = 4) -> tuple[np.ndarray, np.ndarray]:

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import read_mesh, write_ply
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder, atomic_path
 from vermilion.storage.quality import QualityRow, flagged_frames, write_quality
-from vermilion.storage.sequences import read_mesh, read_sequence, write_ply, write_sequence
+from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table, write_table
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vermilion.correction.integration import LayerIntegrator, edge_stiffness
+from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.layers import correction_layers, decode_layers
 from vermilion.correction.right_side import TURN_SERIES, turn_limits
+from vermilion.geometry.cotangents import edge_stiffness
 from vermilion.storage.errors import InputError
 
 

@@ -6,10 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
-from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
+from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import FORMAT_VERSION, LipModel, load_model, save_model

@@ -9,7 +9,7 @@ import pytest
 
 from vermilion.correction.layers import correction_layers
 from vermilion.correction.neutral_pair import NeutralPair, acquainted
-from vermilion.correspondence.correspondence import topology_hash
+from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import LipModel
 from vermilion.storage.errors import InputError

@@ -12,10 +12,10 @@ from vermilion.config.regressors import (
     with_variants,
 )
 from vermilion.config.takes import Take
-from vermilion.correspondence.correspondence import topology_hash
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
+from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.training import Selection, train, training_subjects
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.errors import InputError
-from vermilion.storage.sequences import write_ply
 from vermilion.tracking.external import read_tracked
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])

@@ -16,8 +16,8 @@ import numpy as np
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.evaluation.files import load_arrays, save_arrays
 from vermilion.geometry.head_frame import align_frames
+from vermilion.storage.arrays import load_arrays, save_arrays
 
 _ROUNDS = 20
 

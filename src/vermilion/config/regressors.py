@@ -37,3 +37,33 @@ def with_variants(
     """The names, then every variant of those of them whose kind (PS, MS, GR) is asked for."""
     of_kind = [name for name in names if name.split("-", 1)[0] in kinds]
     return [*names, *(f"{name}-{variant}" for variant in variants for name in of_kind)]
+
+
+#: In the paper's order; what lies between the table's own columns is ours.
+_ORDER = ("base", "contour", "oracle", "PS", "MS", "GR")
+
+
+def kind_of(regressor: str) -> str:
+    """`PS-s1/affine` -> `PS/affine`: the regressor without the subject it was made for."""
+    name, _, variant = regressor.partition("/")
+    kind = name.split("-", 1)[0] if name.startswith(("PS-", "GR-")) else name
+    return f"{kind}/{variant}" if variant else kind
+
+
+def is_variant(regressor: str) -> bool:
+    """Whether a row is of another estimator, features or method than the configured ones.
+
+    A regressor told a neutral (`GR/neutral`) is none: it is the same, told more.
+    """
+    return regressor.partition("/")[2] not in ("", "neutral")
+
+
+def in_order(regressors) -> list[str]:
+    """Regressors in the order of the paper's table, variants after them."""
+
+    def place(name: str):
+        kind, _, variant = kind_of(name).partition("/")
+        rank = _ORDER.index(kind) if kind in _ORDER else len(_ORDER)
+        return is_variant(name), rank, variant, name
+
+    return sorted(set(regressors), key=place)

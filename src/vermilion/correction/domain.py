@@ -42,11 +42,6 @@ class Domain:
     hold: np.ndarray
 
 
-def mesh_corners(triangles: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Ids of the vertices of the triangles `mask` (M,), ascending."""
-    return np.unique(triangles[mask])
-
-
 def integration_domain(
     vertices_mm: np.ndarray, triangles: np.ndarray, mask: np.ndarray, seam_mm: float = 16.0
 ) -> Domain:

@@ -24,7 +24,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.domain import integration_domain, mesh_corners
+from vermilion.correction.domain import integration_domain
 from vermilion.correction.right_side import (
     LANES,
     TURN_SERIES,
@@ -35,10 +35,9 @@ from vermilion.correction.right_side import (
     gather,
     turn_limits,
 )
-from vermilion.geometry.mesh import vertex_areas
+from vermilion.geometry.cotangents import cotangents, edge_stiffness
+from vermilion.geometry.mesh import mesh_corners, vertex_areas
 from vermilion.geometry.sparse import CholeskyFactor
-
-_COTANGENT_RANGE = (0.02, 50.0)
 
 
 class LayerIntegrator:
@@ -182,28 +181,3 @@ class LayerIntegrator:
 
 def _series(precision: np.dtype) -> tuple[np.ndarray, np.ndarray]:
     return TURN_SERIES[np.dtype(precision)], turn_limits(precision)
-
-
-def cotangents(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Half the cotangent of the angle opposite each edge (12, 20, 01), (T, 3), kept positive."""
-    weights = np.empty((len(triangles), 3))
-    for k in range(3):
-        a, b, c = (vertices[triangles[:, (k + i) % 3]] for i in range(3))
-        along, across = b - a, c - a
-        area = np.linalg.norm(np.cross(along, across), axis=1)
-        cotangent = (along * across).sum(axis=1) / np.maximum(area, 1e-12)
-        weights[:, k] = 0.5 * np.clip(cotangent, *_COTANGENT_RANGE)
-    return weights
-
-
-def edge_stiffness(
-    triangles: np.ndarray, weights: np.ndarray, n_vertices: int
-) -> sparse.csr_matrix:
-    """Matrix (V, V) of the energy sum w_ij |x_i - x_j|^2; weights (T, 3) of edges 12, 20, 01."""
-    first = triangles[:, [1, 2, 0]].ravel()
-    second = triangles[:, [2, 0, 1]].ravel()
-    values = weights.ravel()
-    rows = np.concatenate([first, second, first, second])
-    columns = np.concatenate([first, second, second, first])
-    data = np.concatenate([values, values, -values, -values])
-    return sparse.csr_matrix((data, (rows, columns)), shape=(n_vertices, n_vertices))

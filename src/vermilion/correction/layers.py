@@ -15,7 +15,6 @@ import numpy as np
 from vermilion.geometry.deformation_gradients import deformation_gradients
 from vermilion.geometry.rotations import rotation_matrix, rotation_vector
 
-NUMBERS = ("rx", "ry", "rz", "sxx-1", "syy-1", "szz-1", "sxy", "sxz", "syz")
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from vermilion.correction.take_layers import TakeLayers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.correspondence.overlay import portrait_camera
+from vermilion.geometry.camera import portrait_camera
 from vermilion.imaging.draw import colour_map, draw_mesh, label, tile
 
 STRENGTH = 0.8  # length of nine numbers shown in the hottest colour

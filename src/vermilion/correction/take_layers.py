@@ -9,11 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from vermilion.correction.domain import mesh_corners
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.geometry.head_frame import align_frames, head_from_world
-from vermilion.geometry.mesh import vertex_areas
+from vermilion.geometry.mesh import mesh_corners, vertex_areas
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.quality import QualityRow
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.correspondence.lip_sides import lip_sides
-from vermilion.geometry.mesh import Mesh, triangle_normals
+from vermilion.geometry.mesh import Mesh, topology_hash, triangle_normals
 from vermilion.geometry.registration import register, sides_of_triangles
 from vermilion.geometry.surface_points import SurfaceMap, closest_on_surface
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -95,11 +94,6 @@ class Correspondence:
             coarse_triangles=arrays["coarse_triangles"],
             coarse_neutral_mm=arrays["coarse_neutral_mm"],
         )
-
-
-def topology_hash(triangles: np.ndarray) -> str:
-    """SHA-256 of the vertex numbers of a topology, independent of the integer type."""
-    return hashlib.sha256(np.ascontiguousarray(triangles, dtype="<i4").tobytes()).hexdigest()
 
 
 def find_correspondence(

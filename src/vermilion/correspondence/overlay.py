@@ -5,23 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.geometry.camera import Camera, look_at, pinhole
+from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.surface_points import SurfaceMap
 from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, label, tile
 
 SCALE_MM = 3.0
-
-
-def portrait_camera(vertices_mm: np.ndarray, size_px: int = 420) -> Camera:
-    """A camera in front of a face in its head frame (V, 3), which fills the image."""
-    low, high = vertices_mm.min(axis=0), vertices_mm.max(axis=0)
-    middle, distance = (low + high) / 2, 900.0
-    extent = float(max(high[0] - low[0], high[1] - low[1])) * 1.05
-    centre = middle + np.array([0.25 * distance, 0.0, distance])
-    pose = look_at(centre, middle, np.array([0.0, 1.0, 0.0]))
-    focal = size_px / extent * distance * np.hypot(1.0, 0.25)
-    return pinhole("portrait", focal, size_px, size_px, pose)
 
 
 def correspondence_overlay(

@@ -8,7 +8,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry, TrainingSet
+from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry
+from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
 
 #: Fewer frames cannot be cross-validated.

@@ -9,6 +9,8 @@ import numpy as np
 FORMAT = "vermilion-lip-database"
 FORMAT_VERSION = 3
 
+LAYER_NUMBERS = ("rx", "ry", "rz", "sxx-1", "syy-1", "szz-1", "sxy", "sxz", "syz")
+
 
 @dataclass(frozen=True)
 class SubjectEntry:
@@ -64,41 +66,3 @@ class TakeEntry:
                     f"{self.subject}/{self.take}: {name} has {len(getattr(self, name))} frames, "
                     f"expected {n_frames}"
                 )
-
-
-@dataclass(frozen=True)
-class TrainingSet:
-    """Rows that a regressor trains on, takes one after the other, each in order of time.
-
-    Attributes:
-        features: (F, M) float32.
-        layers: (F, T * 9) float32.
-        displacements_mm: (F, N * 3) float32 at the corners of the mask.
-        sequences: (F,) int index into `takes`.
-        takes: names `subject/take`.
-        frames: (F,) int32 frame numbers.
-        neutrals_mm: subject -> (V, 3) coarse neutral, in the order of `subjects`.
-        neutral_features: subject -> (M,) features of their neutral frame, of those who have any.
-    """
-
-    features: np.ndarray
-    layers: np.ndarray
-    displacements_mm: np.ndarray
-    sequences: np.ndarray
-    takes: tuple[str, ...]
-    frames: np.ndarray
-    neutrals_mm: dict[str, np.ndarray]
-    neutral_features: dict[str, np.ndarray]
-
-    @property
-    def subjects(self) -> tuple[str, ...]:
-        """People who have a row, sorted."""
-        present = {self.takes[k].split("/")[0] for k in np.unique(self.sequences)}
-        return tuple(sorted(present))
-
-    @property
-    def persons(self) -> np.ndarray:
-        """(F,) int index into `subjects`."""
-        of_take = [self.takes[k].split("/")[0] for k in range(len(self.takes))]
-        index = [self.subjects.index(s) if s in self.subjects else -1 for s in of_take]
-        return np.asarray(index, dtype=np.int64)[self.sequences]

@@ -9,11 +9,8 @@ import h5py
 import numpy as np
 
 import vermilion
-from vermilion.correction.domain import mesh_corners
-from vermilion.correction.layers import NUMBERS
-from vermilion.correspondence.correspondence import topology_hash
-from vermilion.database.schema import FORMAT, FORMAT_VERSION, SubjectEntry, TakeEntry
-from vermilion.geometry.mesh import triangle_areas
+from vermilion.database.schema import FORMAT, FORMAT_VERSION, LAYER_NUMBERS, SubjectEntry, TakeEntry
+from vermilion.geometry.mesh import mesh_corners, topology_hash, triangle_areas
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 
@@ -82,7 +79,7 @@ def write_database(
         _dataset(file, "mask/vertices", corners.astype(np.int32))
         _dataset(file, "mask/area_mm2", area.astype(np.float64))
         _dataset(file, "features/names", np.array(list(feature_names), dtype="S"))
-        _dataset(file, "layers/names", np.array(NUMBERS, dtype="S"))
+        _dataset(file, "layers/names", np.array(LAYER_NUMBERS, dtype="S"))
         for entry in subjects:
             _dataset(file, f"subjects/{entry.subject}/neutral_mm", entry.neutral_mm)
             if entry.neutral_features is not None:

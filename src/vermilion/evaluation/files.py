@@ -7,17 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.evaluation.errors import ClipSums
-from vermilion.storage.arrays import read_arrays, write_arrays
-
-
-def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write `.npz` (no pickle), whole or not at all."""
-    write_arrays(path, compressed=True, **arrays)
-
-
-def load_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read `.npz`; raises InputError where it is damaged."""
-    return read_arrays(path, "file of the evaluation")
+from vermilion.storage.arrays import load_arrays, save_arrays
 
 
 def save_sums(path: str | Path, sums: dict[str, ClipSums], n_frames: int) -> None:

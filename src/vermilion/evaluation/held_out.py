@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.config.regressors import is_variant
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
@@ -20,7 +21,6 @@ from vermilion.geometry.closest_points import SurfacePoints
 from vermilion.geometry.frame_alignment import moved
 from vermilion.geometry.mesh import triangle_areas
 from vermilion.regression.model import LipModel
-from vermilion.report.table1 import is_variant
 
 _EYE_CORNERS = (36, 45)
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import kind_of
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.masks import REGION_NAMES
 from vermilion.evaluation.statistics import Resampling, histogram_quantile
-from vermilion.report.table1 import kind_of
 
 COLUMNS = (
     "measure", "region", "subject", "take", "regressor", "value", "unit", "low", "high", "frames",

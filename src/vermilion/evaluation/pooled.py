@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import in_order, kind_of
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.measures import COLUMNS, measure_rows
-from vermilion.report.table1 import in_order, kind_of
 
 #: What the rows of several takes together call their subject.
 TOGETHER = "all"

@@ -230,3 +230,14 @@ def write_cameras(folder: str | Path, cameras: dict[str, Camera]) -> None:
         (temporary / "cameras.txt").write_text("\n".join(lines) + "\n")
         (temporary / "images.txt").write_text("\n".join(poses) + "\n")
         (temporary / "points3D.txt").write_text("")
+
+
+def portrait_camera(vertices_mm: np.ndarray, size_px: int = 420) -> Camera:
+    """A camera in front of a face in its head frame (V, 3), which fills the image."""
+    low, high = vertices_mm.min(axis=0), vertices_mm.max(axis=0)
+    middle, distance = (low + high) / 2, 900.0
+    extent = float(max(high[0] - low[0], high[1] - low[1])) * 1.05
+    centre = middle + np.array([0.25 * distance, 0.0, distance])
+    pose = look_at(centre, middle, np.array([0.0, 1.0, 0.0]))
+    focal = size_px / extent * distance * np.hypot(1.0, 0.25)
+    return pinhole("portrait", focal, size_px, size_px, pose)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,3 +131,13 @@ def rigid_alignment(
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
     rotation = vt.T @ flip @ u.T
     return rotation, target_mean - rotation @ source_mean
+
+
+def mesh_corners(triangles: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Ids of the vertices of the triangles `mask` (M,), ascending."""
+    return np.unique(triangles[mask])
+
+
+def topology_hash(triangles: np.ndarray) -> str:
+    """SHA-256 of the vertex numbers of a topology, independent of the integer type."""
+    return hashlib.sha256(np.ascontiguousarray(triangles, dtype="<i4").tobytes()).hexdigest()

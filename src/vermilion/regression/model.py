@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 import vermilion
-from vermilion.correspondence.correspondence import topology_hash
+from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs

@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from vermilion.database.schema import TrainingSet
 from vermilion.regression.cross_validation import (
     Curve,
     Rule,
@@ -22,6 +21,7 @@ from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
+from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
 
 Kind = Literal["rbf", "affine", "kernel"]

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import in_order, is_variant, kind_of
 from vermilion.imaging.plot import new_figure, plain, save, with_gaps
-from vermilion.report.table1 import in_order, is_variant, kind_of, place_of
+from vermilion.report.table1 import place_of
 
 COLOURS = {
     "base": "#8c8c8c", "oracle": "#2b2b2b", "contour": "#b08d57", "PS": "#c8553d",

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import is_variant
 from vermilion.evaluation.mouth_kinds import KINDS
 from vermilion.report import page
 from vermilion.report.statements import statements
-from vermilion.report.table1 import is_variant
 
 _LACKING = (
     '<p class="none">Nothing was trained for this: <code>evaluation.variants</code> names what is '

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from vermilion.config.regressors import in_order, is_variant
 from vermilion.report import page, study
 from vermilion.report.how_measured import how_measured
-from vermilion.report.table1 import in_order, is_variant, place_of
+from vermilion.report.table1 import place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
 REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")

@@ -4,23 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-#: In the paper's order; what lies between the table's own columns is ours.
-_ORDER = ("base", "contour", "oracle", "PS", "MS", "GR")
-
-
-def kind_of(regressor: str) -> str:
-    """`PS-s1/affine` -> `PS/affine`: the regressor without the subject it was made for."""
-    name, _, variant = regressor.partition("/")
-    kind = name.split("-", 1)[0] if name.startswith(("PS-", "GR-")) else name
-    return f"{kind}/{variant}" if variant else kind
-
-
-def is_variant(regressor: str) -> bool:
-    """Whether a row is of another estimator, features or method than the configured ones.
-
-    A regressor told a neutral (`GR/neutral`) is none: it is the same, told more.
-    """
-    return regressor.partition("/")[2] not in ("", "neutral")
+from vermilion.config.regressors import in_order
 
 
 def place_of(subject: str, take: str) -> str:
@@ -28,17 +12,6 @@ def place_of(subject: str, take: str) -> str:
     if subject != "all":
         return f"{subject}/{take}"
     return "all takes" if take == "all" else f"all {take} takes"
-
-
-def in_order(regressors) -> list[str]:
-    """Regressors in the order of the paper's table, variants after them."""
-
-    def place(name: str):
-        kind, _, variant = kind_of(name).partition("/")
-        rank = _ORDER.index(kind) if kind in _ORDER else len(_ORDER)
-        return is_variant(name), rank, variant, name
-
-    return sorted(set(regressors), key=place)
 
 
 def table1(measures: pd.DataFrame, region: str = "mouth") -> pd.DataFrame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.correspondence.overlay import portrait_camera
+from vermilion.geometry.camera import portrait_camera
 from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, label, tile
 from vermilion.scan.personal import PersonalModel
 

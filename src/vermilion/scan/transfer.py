@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.integration import cotangents
+from vermilion.geometry.cotangents import cotangents
 from vermilion.geometry.deformation_gradients import deformation_gradients
 from vermilion.geometry.sparse import CholeskyFactor
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.geometry.mesh import Mesh
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 
@@ -62,38 +61,3 @@ def locate(paths: Sequence[str | Path], frames: Sequence[int]) -> dict[int, tupl
         for row, frame in enumerate(frames_of([path]))
         if int(frame) in wanted
     }
-
-
-def write_ply(path: str | Path, mesh: Mesh, colours: np.ndarray | None = None) -> None:
-    """Write a binary PLY; `colours` (V, 3) uint8 optional."""
-    n_vertices, n_triangles = len(mesh.vertices_mm), len(mesh.triangles)
-    fields = [("xyz", "<f4", 3)]
-    header = ["ply", "format binary_little_endian 1.0", "comment unit millimetre"]
-    header += [f"element vertex {n_vertices}"] + [f"property float {axis}" for axis in "xyz"]
-    if colours is not None:
-        fields.append(("rgb", "u1", 3))
-        header += [f"property uchar {name}" for name in ("red", "green", "blue")]
-    header += [f"element face {n_triangles}", "property list uchar int vertex_indices"]
-    header += ["end_header", ""]
-    vertices = np.zeros(n_vertices, dtype=fields)
-    vertices["xyz"] = mesh.vertices_mm
-    if colours is not None:
-        vertices["rgb"] = colours
-    faces = np.zeros(n_triangles, dtype=[("count", "u1"), ("ids", "<i4", 3)])
-    faces["count"], faces["ids"] = 3, mesh.triangles
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        stream.write("\n".join(header).encode("ascii"))
-        stream.write(vertices.tobytes() + faces.tobytes())
-
-
-def read_mesh(path: str | Path) -> Mesh:
-    """Read a PLY, OBJ or other mesh that trimesh knows, without merging or reordering vertices."""
-    import trimesh  # costs two seconds to import, and few callers need it
-
-    try:
-        mesh = trimesh.load(path, process=False, maintain_order=True, force="mesh")
-    except Exception as error:
-        raise InputError(
-            f"an unreadable mesh ({error})", "PLY or OBJ", "Export the mesh again.", path=path
-        ) from error
-    return Mesh(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))

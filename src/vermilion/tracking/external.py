@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.storage.errors import InputError
-from vermilion.storage.sequences import read_mesh
 
 MESH_SUFFIXES = (".obj", ".ply")
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")

@@ -26,7 +26,7 @@ from vermilion.config.evaluation import (
     ReferenceConfig,
 )
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.evaluation.files import load_arrays, save_arrays
+from vermilion.storage.arrays import load_arrays, save_arrays
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity
 

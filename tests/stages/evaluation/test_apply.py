@@ -10,10 +10,11 @@ import pytest
 from tests.stages.evaluation.conftest import CFG, SUBJECT
 from tests.stages.lip_scene import BAD_FRAME, CHUNKS
 from tests.stages.run_script import run_script
-from vermilion.evaluation.files import load_arrays, save_arrays
+from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import VideoReader
-from vermilion.storage.sequences import read_mesh, read_sequence
+from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow

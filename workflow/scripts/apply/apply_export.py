@@ -13,10 +13,11 @@ from vermilion.export.usd import write_usd
 from vermilion.export.weights import write_weights
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.files import atomic_folder
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.storage.sequences import read_sequence, write_ply, write_sequence
+from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.result import TrackedTake
 

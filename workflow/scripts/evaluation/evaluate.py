@@ -18,7 +18,7 @@ from vermilion.correction.neutral_pair import acquainted, neutral_pairs
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation import held_out
 from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
-from vermilion.evaluation.files import save_arrays, save_sums
+from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.lips import LipTolerances
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
@@ -27,6 +27,7 @@ from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_
 from vermilion.evaluation.truth import read_curves, read_truth
 from vermilion.faces.model import FaceModel
 from vermilion.regression.model import load_model
+from vermilion.storage.arrays import save_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to

@@ -3,13 +3,13 @@
 import numpy as np
 
 from vermilion.config.evaluation import FiguresConfig
-from vermilion.evaluation.files import load_arrays
+from vermilion.config.regressors import in_order
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.report import mesh_sheets
 from vermilion.report.figures import curves
-from vermilion.report.table1 import in_order
+from vermilion.storage.arrays import load_arrays
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table

@@ -7,6 +7,7 @@ from vermilion.config.multiview import ImageConfig, NeutralConfig, RefineConfig,
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.mesh import unique_edges
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.cloud import write_cloud
@@ -18,7 +19,6 @@ from vermilion.multiview.register_to_first_take import with_points_of
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.storage.logfile import log_to
-from vermilion.storage.sequences import write_ply
 
 
 def refiner_of_first_take(snakemake, image_settings, stereo, model):

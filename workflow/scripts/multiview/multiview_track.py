@@ -4,10 +4,10 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.multiview.files import read_anchor, read_clip, read_neutral, write_track
 from vermilion.multiview.track import join_clips
 from vermilion.storage.logfile import log_to
-from vermilion.storage.sequences import write_ply
 
 
 def main(snakemake):

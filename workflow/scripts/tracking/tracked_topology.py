@@ -1,8 +1,8 @@
 """The topology of a mesh sequence that another tracker made."""
 
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.logfile import log_to
-from vermilion.storage.sequences import write_ply
 from vermilion.tracking.external import read_tracked
 
 

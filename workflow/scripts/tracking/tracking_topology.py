@@ -2,8 +2,8 @@
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.logfile import log_to
-from vermilion.storage.sequences import write_ply
 from vermilion.tracking.result import Identity
 
 
