@@ -10,7 +10,7 @@ if not workflow.configfiles:
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/face.smk"
+include: "workflow/rules/face_model.smk"
 include: "workflow/rules/studio.smk"
 include: "workflow/rules/capture.smk"
 include: "workflow/rules/landmarks.smk"
@@ -18,18 +18,14 @@ include: "workflow/rules/multiview.smk"
 include: "workflow/rules/inpaint.smk"
 include: "workflow/rules/scan.smk"
 include: "workflow/rules/tracking.smk"
-include: "workflow/rules/refinement.smk"
 include: "workflow/rules/detail.smk"
-include: "workflow/rules/shading.smk"
 include: "workflow/rules/contours.smk"
 include: "workflow/rules/correspondence.smk"
 include: "workflow/rules/features.smk"
 include: "workflow/rules/correction.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"
-include: "workflow/rules/evaluation_inputs.smk"
 include: "workflow/rules/evaluation.smk"
-include: "workflow/rules/measures.smk"
 include: "workflow/rules/apply.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/targets.smk"
@@ -51,14 +47,13 @@ rule captures:
 rule database_only:
     """The training database of all subjects (Lips16 section 3)."""
     input:
-        R + "/database/lips.h5",
+        P.database,
 
 
 rule detail:
-    """The finer sequences of `detail.takes` and `detail.shading.takes` (Mono13 sections 7, 8)."""
+    """The finer sequences of `detail.takes` and `detail.relief.takes` (Mono13 sections 7, 8)."""
     input:
         detail_outputs(),
-        shading_outputs(),
 
 
 rule regressors:

@@ -25,7 +25,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.appearance.estimate import Appearance
-from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
@@ -126,15 +125,14 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     path = folder / "landmark_fit.npz"
     fit = TrackedTake.load(path if path.exists() else folder / "fit.npz")
     track = LandmarkTrack.load(sorted((folder.parent / "landmarks").glob("*.npz")))
-    tracking = TrackingConfig().model_dump(mode="json")
-    options = RefinementConfig().model_dump(mode="json")
-    settings = fit_settings(tracking["fit"], tracking["motion"])
+    options = TrackingConfig().model_dump(mode="json")
+    settings = fit_settings(options["fit"], options["motion"])
     start = TakeStart.of(model, person, fit, track, settings)
     appearance = Appearance.load(folder / "appearance.npz")
     face = start.face(appearance.samples)
-    photometric = PhotometricSettings(**options["fit"])
+    photometric = PhotometricSettings(**options["image_fit"]["frame_fit"])
     problem = FrameProblem(face, appearance, photometric, settings.weight_sigma)
-    bending = LayerSettings(**options["offsets"])
+    bending = LayerSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
     layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
     frames, levels = open_frames(source), len(photometric.iterations)
     rows = np.unique(np.linspace(0, len(fit.frames) - 1, count).round().astype(int))
@@ -145,7 +143,7 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     for row in rows:
         marks = [time.process_time()]
         image = frames.read(fit.camera.name, int(fit.frames[row]))
-        view = start.view(row, image, face, options["appearance"]["pixel_mm"], levels)
+        view = start.view(row, image, face, options["image_fit"]["appearance"]["pixel_mm"], levels)
         marks.append(time.process_time())
         problem.solve(view)
         marks.append(time.process_time())

@@ -113,7 +113,7 @@ def write_subject(root: Path, subject: str, accurate: FaceModel, tracker: FaceMo
         rows = [QualityRow(frame) for frame in range(first, last + 1)]
         write_quality(folder / f"multiview/quality/{chunk}.tsv", subject, "rom", "multiview", rows)
         np.savez(
-            _made(folder / f"correction/features/{chunk}.npz"), frames=frames[part],
+            _made(folder / f"features/{chunk}.npz"), frames=frames[part],
             features=features[part], names=np.array(names), valid=np.ones(last + 1 - first, bool),
         )  # fmt: skip
     points = camera.project(high[:, accurate.landmarks])

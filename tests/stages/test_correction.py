@@ -106,7 +106,7 @@ def run_neutral_pair(root, subject):
             "accurate": take / "multiview/neutral.npz",
             "coarse": [take / f"tracking/C/{CHUNKS[0]}.npy"],
             "fit": take / "tracking/fit.npz",
-            "features": [take / f"correction/features/{CHUNKS[0]}.npz"],
+            "features": [take / f"features/{CHUNKS[0]}.npz"],
             "correspondence": person / "correspondence.npz",
             "identity": person / "identity.npz",
         },

@@ -197,24 +197,24 @@ def test_chosen_frames_are_well_fitted_and_differ():
 def test_ablations_tell_frames_that_taught_the_appearance_from_others():
     table = pd.DataFrame(
         {
-            "subject": "s", "take": "t", "step": ["landmarks"] * 3 + ["photometric"] * 3,
+            "subject": "s", "take": "t", "step": ["landmarks"] * 3 + ["image_fit"] * 3,
             "frame": [0, 1, 2] * 2, "residual": [1.0, 3.0, np.nan, 0.5, 1.5, 2.5],
             "learnt_from": [1, 0, 0] * 2,
         }
     )  # fmt: skip
     rows = ablation_rows(table)
-    assert list(rows["step"]) == ["landmarks", "photometric"]
+    assert list(rows["step"]) == ["landmarks", "image_fit"]
     assert list(rows["residual"]) == [2.0, 1.5]
     assert list(rows["held_out"]) == [3.0, 2.0]
     assert list(rows["frames"]) == [2, 3]
 
 
 def test_ablations_say_which_residuals_compare():
-    steps = ["photometric", "before_flow", "flow", "before_shading", "shading"]
+    steps = ["image_fit", "before_flow", "flow", "before_relief", "relief"]
     table = pd.DataFrame(
         {"subject": "s", "take": "t", "step": steps, "frame": 0, "residual": [2.0, 4, 3, 5, 4]}
     )
     bases = ablation_rows(table).set_index("step")["basis"]
     assert bases["before_flow"] == bases["flow"]
-    assert bases["before_shading"] == bases["shading"]
+    assert bases["before_relief"] == bases["relief"]
     assert len(set(bases)) == 3

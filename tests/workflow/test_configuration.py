@@ -6,7 +6,9 @@ import pytest
 import yaml
 
 from vermilion.config.load import load_configuration
+from vermilion.config.moved import MOVED
 from vermilion.config.reference import generated_files
+from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO
 from vermilion.storage.errors import ConfigurationError
 
@@ -100,3 +102,26 @@ def test_generated_files_are_up_to_date(name):
         stored.splitlines(), expected.splitlines(), name, "generated", lineterm=""
     )
     assert stored == expected, "run `make docs`:\n" + "\n".join(difference)
+
+
+@pytest.mark.parametrize(("old", "new"), sorted(MOVED.items()))
+def test_key_of_an_earlier_version_is_named_with_its_new_name(old, new):
+    raw = {"takes": str(ROOT / "config/takes.tsv")}
+    section = raw
+    *parts, last = old.split(".")
+    for part in parts:
+        section = section.setdefault(part, {})
+    section[last] = True
+    with pytest.raises(ConfigurationError) as caught:
+        load_configuration(raw, "old.yaml", check_disk=False)
+    message = str(caught.value)
+    assert f"key {old}: found a key of an earlier version; expected {new}" in message
+    assert "unknown key" not in message
+
+
+def test_every_new_name_is_a_key():
+    for new in MOVED.values():
+        section = Configuration
+        for part in new.split("."):
+            field = section.model_fields[part]
+            section = field.annotation

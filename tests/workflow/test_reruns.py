@@ -18,7 +18,7 @@ AFTER_TRAINING = {
 AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
 AFTER_CONTOURS = AFTER_FEATURES | {"features", "neutral_pair"}
 AFTER_TRACKING = AFTER_CONTOURS | {
-    "appearance", "photometric", "photometric_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
+    "appearance", "image_fit", "image_fit_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
     "landmarks", "image_identity", "tracking", "tracking_topology", "contour_detector", "contours",
@@ -128,21 +128,25 @@ def test_chunk_size(finished):
 
 
 def test_comment_in_a_library_module(finished):
-    path = finished.folder / "src" / "vermilion" / "mesh.py"
+    path = finished.folder / "src" / "vermilion" / "geometry" / "mesh.py"
     with changed(path, path.read_bytes() + b"\n# a comment\n"):
         assert finished.would_run() == {}
 
 
 def test_overlay_of_the_refinement(finished):
-    with configured(finished, lambda content: content["refinement"].update(overlay_frames=2)):
+    with configured(
+        finished, lambda content: content["tracking"]["image_fit"].update(overlay_frames=2)
+    ):
         assert set(finished.would_run()) == {"residuals", "ablations", "summary"}
 
 
 def test_refinement_switched_off(finished):
-    with configured(finished, lambda content: content["refinement"].update(photometric=False)):
+    with configured(
+        finished, lambda content: content["tracking"]["image_fit"].update(enabled=False)
+    ):
         jobs = set(finished.would_run())
     assert {"tracking", "tracking_meshes"} <= jobs
-    assert not jobs & {"appearance", "photometric", "photometric_join", "residuals", "ablations"}
+    assert not jobs & {"appearance", "image_fit", "image_fit_join", "residuals", "ablations"}
 
 
 def test_identity_from_landmarks_alone(finished):
@@ -157,24 +161,24 @@ def test_identity_from_landmarks_alone(finished):
 
 def test_relief_of_a_take(finished):
     def change(content):
-        content["detail"] = {"shading": {"takes": [TAKE]}}
+        content["detail"] = {"relief": {"takes": [TAKE]}}
 
-    added = {"shading_light", "shading_relief", "shading_meshes"}
+    added = {"relief_light", "relief", "relief_meshes"}
     with configured(finished, change):
         assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
 
 
 def test_relief_after_the_corrective_flow(finished):
     def change(content):
-        content["detail"] = {"takes": [TAKE], "shading": {"takes": [TAKE]}}
+        content["detail"] = {"takes": [TAKE], "relief": {"takes": [TAKE]}}
 
-    added = {"detail_flow", "shading_light", "shading_relief", "shading_meshes"}
+    added = {"detail_flow", "relief_light", "relief", "relief_meshes"}
     with configured(finished, change):
         assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
 
 
 def test_line_of_code_in_the_tracking_module(finished):
-    path = finished.folder / "src" / "vermilion" / "tracking" / "expression.py"
+    path = finished.folder / "src" / "vermilion" / "tracking" / "landmark_fit" / "expression.py"
     with changed(path, path.read_bytes() + b"\nCHANGED = True\n"):
         jobs = set(finished.would_run())
     contours = {"contour_detector", "contours"}  # they start from the track or are held against it

@@ -1,17 +1,19 @@
 """Better lips for a video (Lips16 6): apply/<subject>/<take>/ with meshes, weights, USD, overlay."""
 
-APPLIED = R + "/apply/{subject}/{take}"
+
+def apply_regressor(wildcards):
+    """Name of the regressor that the configuration names, for this subject."""
+    return CONFIG.apply.regressor.replace("{subject}", wildcards.subject)
 
 
 def apply_model(wildcards):
-    """The regressor that the configuration names, for this subject."""
-    return f"{R}/models/{CONFIG.apply.regressor.replace('{subject}', wildcards.subject)}.h5"
+    """File of that regressor."""
+    return P.model.format(regressor=apply_regressor(wildcards))
 
 
 def apply_neutral(wildcards):
     """Neutrals that tell a regressor what it does not know: the person's, the take's (`unpack`)."""
-    name = CONFIG.apply.regressor.replace("{subject}", wildcards.subject)
-    known = wildcards.subject in trained_on(name, trained_subjects())
+    known = wildcards.subject in trained_on(apply_regressor(wildcards), trained_subjects())
     if known or not takes("tattoo", wildcards.subject):
         return neutral_of_take(wildcards)
     return {"neutral_pair": neutral_pair_of(wildcards.subject), **neutral_of_take(wildcards)}
@@ -20,26 +22,26 @@ def apply_neutral(wildcards):
 def apply_exports():
     """Outputs of a corrected take; USD and OBJ as the configuration asks."""
     outputs = {
-        "corrected": APPLIED + "/corrected.npy",
-        "mesh": APPLIED + "/mesh.ply",
-        "weights": APPLIED + "/weights.csv",
+        "corrected": P.applied + "/corrected.npy",
+        "mesh": P.applied + "/mesh.ply",
+        "weights": P.applied + "/weights.csv",
         "overlay": report(
-            APPLIED + "/overlay.mp4",
+            P.apply_overlay,
             category="Corrected takes",
             labels={"take": "{subject}/{take}"},
             caption="../report/overlay.rst",
         ),
         "timeline": report(
-            APPLIED + "/timeline.png",
+            P.timeline,
             category="Corrected takes",
             labels={"take": "{subject}/{take}, time line"},
             caption="../report/timeline.rst",
         ),
     }
     if CONFIG.apply.export.usd:
-        outputs["usd"] = APPLIED + "/corrected.usdc"
+        outputs["usd"] = P.applied + "/corrected.usdc"
     if CONFIG.apply.export.obj:
-        outputs["obj"] = directory(APPLIED + "/obj")
+        outputs["obj"] = directory(P.applied + "/obj")
     return outputs
 
 
@@ -47,55 +49,47 @@ def chunks_around(pattern):
     """Input function: `pattern` for the chunks with a frame that the wildcards' chunk depends on."""
 
     def files(wildcards):
-        frames = frames_in(wildcards.chunk)
-        reach = CONFIG.correction.reach_frames(take_of(wildcards).fps)
-        near = [
-            chunk
-            for chunk in chunks(wildcards.subject, wildcards.take)
-            if frames_in(chunk)[0] <= frames[-1] + reach
-            and frames_in(chunk)[-1] >= frames[0] - reach
-        ]
-        return [pattern.format(**{**dict(wildcards), "chunk": chunk}) for chunk in near]
+        near = near_chunks(wildcards, CONFIG.correction.reach_frames(take_fps(wildcards)))
+        return [fill(pattern, wildcards, chunk=chunk) for chunk in near]
 
     return files
 
 
 def applied_takes():
-    """Takes to be corrected, `subject/take`: those named, or all of role `video`."""
-    rows = takes("video")
-    return CONFIG.apply.takes or [
-        take.name for take in rows if take.name not in CONFIG.landmarks.training_takes
-    ]
+    """Takes to be corrected: those named, or all of role `video`."""
+    if CONFIG.apply.takes:
+        return [_TAKES[name] for name in CONFIG.apply.takes]
+    return [take for take in takes("video") if take.name not in CONFIG.landmarks.training_takes]
 
 
 rule apply:
     """Corrects a chunk of a take and draws original, base and corrected side by side."""
     input:
-        unpack(mono_inputs),
         unpack(apply_neutral),
+        images=chunk_images,
         tracker=tracker_of,
-        identity=R + "/subjects/{subject}/identity.npz",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        coarse=chunks_around(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
-        features=chunks_around(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
+        identity=P.identity,
+        fit=P.fit,
+        coarse=chunks_around(P.coarse),
+        features=chunks_around(P.features),
         model=apply_model,
     output:
-        corrected=APPLIED + "/chunks/{chunk}.npy",
-        overlay=APPLIED + "/chunks/{chunk}.mp4",
-        quality=APPLIED + "/quality/{chunk}.tsv",
+        corrected=P.corrected,
+        overlay=P.apply_clip,
+        quality=P.apply_quality,
     log:
-        R + "/logs/apply/{subject}-{take}-{chunk}.log",
+        P.log("apply", "chunk"),
     benchmark:
-        R + "/benchmarks/apply/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("apply", "chunk")
     resources:
         mem_mb=1500,
         runtime=60,
     params:
         cfg=cfg_of("apply.overlay", "correction.integration", "correction.image"),
         code=code_of("apply/apply"),
-        frames=lambda wildcards: frames_in(wildcards.chunk),
-        fps=lambda wildcards: take_of(wildcards).fps,
-        source=mono_source,
+        frames=chunk_frames,
+        fps=take_fps,
+        source=chunk_source,
         camera=mono_camera,
     script:
         "../scripts/apply/apply.py"
@@ -105,23 +99,23 @@ rule apply_export:
     """Joins the chunks of a take into the files that Blender, Maya or Unreal open."""
     input:
         tracker=tracker_of,
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        corrected=per_chunk(APPLIED + "/chunks/{chunk}.npy"),
-        overlays=per_chunk(APPLIED + "/chunks/{chunk}.mp4"),
-        quality=per_chunk(APPLIED + "/quality/{chunk}.tsv"),
+        fit=P.fit,
+        corrected=per_chunk(P.corrected),
+        overlays=per_chunk(P.apply_clip),
+        quality=per_chunk(P.apply_quality),
     output:
         **apply_exports(),
     log:
-        R + "/logs/apply_export/{subject}-{take}.log",
+        P.log("apply_export", "take"),
     benchmark:
-        R + "/benchmarks/apply_export/{subject}-{take}.tsv"
+        P.benchmark("apply_export", "take")
     resources:
         mem_mb=2000,
         runtime=30,
     params:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),
-        fps=lambda wildcards: take_of(wildcards).fps,
+        fps=take_fps,
     script:
         "../scripts/apply/apply_export.py"
 
@@ -129,28 +123,28 @@ rule apply_export:
 rule makeup:
     """Draws virtual make-up and a checkerboard on the corrected face (Mono13 9)."""
     input:
-        unpack(mono_inputs),
+        images=chunk_images,
         tracker=tracker_of,
-        identity=R + "/subjects/{subject}/identity.npz",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        appearance=R + "/takes/{subject}/{take}/tracking/appearance.npz",
-        corrected=APPLIED + "/chunks/{chunk}.npy",
+        identity=P.identity,
+        fit=P.fit,
+        appearance=P.appearance,
+        corrected=P.corrected,
     output:
-        video=APPLIED + "/makeup/{chunk}.mp4",
-        image=APPLIED + "/makeup/{chunk}.png",
+        video=P.makeup_chunk + ".mp4",
+        image=P.makeup_chunk + ".png",
     log:
-        R + "/logs/makeup/{subject}-{take}-{chunk}.log",
+        P.log("makeup", "chunk"),
     benchmark:
-        R + "/benchmarks/makeup/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("makeup", "chunk")
     resources:
         mem_mb=1500,
         runtime=60,
     params:
         cfg=cfg_of("apply.makeup", "apply.overlay"),
         code=code_of("apply/makeup"),
-        frames=lambda wildcards: frames_in(wildcards.chunk),
-        fps=lambda wildcards: take_of(wildcards).fps,
-        source=mono_source,
+        frames=chunk_frames,
+        fps=take_fps,
+        source=chunk_source,
     script:
         "../scripts/apply/makeup.py"
 
@@ -158,20 +152,20 @@ rule makeup:
 rule makeup_join:
     """Joins the make-up of a take: makeup.mp4, and an image of its first chunk."""
     input:
-        videos=per_chunk(APPLIED + "/makeup/{chunk}.mp4"),
-        images=per_chunk(APPLIED + "/makeup/{chunk}.png"),
+        videos=per_chunk(P.makeup_chunk + ".mp4"),
+        images=per_chunk(P.makeup_chunk + ".png"),
     output:
         video=report(
-            APPLIED + "/makeup.mp4",
+            P.makeup,
             category="Corrected takes",
             labels={"take": "{subject}/{take}, make-up"},
             caption="../report/makeup.rst",
         ),
-        image=APPLIED + "/makeup.png",
+        image=P.applied + "/makeup.png",
     log:
-        R + "/logs/makeup_join/{subject}-{take}.log",
+        P.log("makeup_join", "take"),
     benchmark:
-        R + "/benchmarks/makeup_join/{subject}-{take}.tsv"
+        P.benchmark("makeup_join", "take")
     localrule: True
     resources:
         mem_mb=500,

@@ -32,8 +32,8 @@ def capture_inputs(wildcards):
     """Images of a chunk that exist, and the calibration; a missing image is the job's to name."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        images = studio_frames(wildcards.subject, wildcards.take, wildcards.chunk)
-        return images + studio_cameras(wildcards.subject, wildcards.take)
+        images = studio_frames(wildcards, wildcards.chunk)
+        return images + studio_cameras(wildcards)
     if Path(take.source).suffix.lower() in VIDEO_SUFFIXES:
         return [take.source]
     files = capture_files(take.source)
@@ -44,7 +44,7 @@ def capture_inputs(wildcards):
 def camera_inputs(wildcards):
     """The calibration of a take: its files, or what the studio writes beside its images."""
     if take_of(wildcards).source == STUDIO:
-        return studio_cameras(wildcards.subject, wildcards.take)
+        return studio_cameras(wildcards)
     return camera_files(source_of(wildcards))
 
 
@@ -53,13 +53,13 @@ rule capture:
     input:
         capture_inputs,
     output:
-        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
-        quality=R + "/takes/{subject}/{take}/capture/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/capture/overlay/{chunk}.png",
+        manifest=P.manifest,
+        quality=P.capture_quality,
+        overlay=P.capture_overlay,
     log:
-        R + "/logs/capture/{subject}-{take}-{chunk}.log",
+        P.log("capture", "chunk"),
     benchmark:
-        R + "/benchmarks/capture/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("capture", "chunk")
     resources:
         mem_mb=800,
         runtime=60,
@@ -69,7 +69,7 @@ rule capture:
         source=source_of,
         camera=mono_camera,
         multiview=lambda wildcards: take_of(wildcards).is_multiview,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
     script:
         "../scripts/capture/capture.py"
 
@@ -78,15 +78,15 @@ rule cameras:
     """Reads, calibrates or assumes a take's cameras, refines them: cameras/ (COLMAP text), cameras.json."""
     input:
         calibration=camera_inputs,
-        manifests=per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        manifests=per_chunk(P.manifest),
     output:
-        cameras=directory(R + "/takes/{subject}/{take}/cameras"),
-        summary=R + "/takes/{subject}/{take}/capture/cameras.json",
-        overlay=R + "/takes/{subject}/{take}/capture/overlay/cameras.png",
+        cameras=directory(P.cameras),
+        summary=P.calibration,
+        overlay=P.cameras_overlay,
     log:
-        R + "/logs/cameras/{subject}-{take}.log",
+        P.log("cameras", "take"),
     benchmark:
-        R + "/benchmarks/cameras/{subject}-{take}.tsv"
+        P.benchmark("cameras", "take")
     resources:
         mem_mb=1500,
         runtime=60,
@@ -94,6 +94,6 @@ rule cameras:
         cfg=cfg_of("capture.calibration", "capture.refinement"),
         code=code_of("capture/cameras"),
         camera=mono_camera,
-        frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
+        frames=take_span,
     script:
         "../scripts/capture/cameras.py"

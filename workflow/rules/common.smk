@@ -32,8 +32,12 @@ try:
 except ConfigurationError as error:
     raise WorkflowError(str(error)) from None
 
-R = CONFIG.results
 SCRIPTS = Path(workflow.basedir) / "workflow" / "scripts"
+
+
+include: "paths.smk"
+
+
 _TAKES = {take.name: take for take in TAKES}
 
 
@@ -92,9 +96,9 @@ def take_of(wildcards):
     return _TAKES[name]
 
 
-def chunks(subject, take):
-    """Names `<first>-<last>` of the chunks of a take."""
-    row = _TAKES[f"{subject}/{take}"]
+def chunks(take):
+    """Names `<first>-<last>` of the chunks of a take (a row, or wildcards)."""
+    row = take_of(take)
     size = CONFIG.chunk_frames
     starts = range(row.first, row.last + 1, size)
     return [f"{a:06d}-{min(a + size - 1, row.last):06d}" for a in starts]
@@ -106,71 +110,105 @@ def frames_in(chunk):
     return list(range(first, last + 1))
 
 
+def fill(pattern, take, **values):
+    """A pattern of `P` for a take (a row, or wildcards) and other wildcards; the rest are kept."""
+    for name, value in {"subject": take.subject, "take": take.take, **values}.items():
+        pattern = pattern.replace(f"{{{name}}}", value)
+    return pattern
+
+
+def of_chunks(pattern, take):
+    """`pattern` for every chunk of a take (a row, or wildcards)."""
+    return [fill(pattern, take, chunk=chunk) for chunk in chunks(take)]
+
+
+def of_takes(pattern, rows):
+    """`pattern` for each of some takes, and for each of their chunks where it has them."""
+    paths = [path for take in rows for path in of_chunks(pattern, take)]
+    return list(dict.fromkeys(paths))
+
+
 def per_chunk(pattern):
     """Input function: `pattern` for every chunk of the wildcards' take."""
-    return lambda wildcards: expand_chunks(pattern, wildcards.subject, wildcards.take)
+    return lambda wildcards: of_chunks(pattern, wildcards)
 
 
 def first_chunk(pattern):
     """Input function: `pattern` for the chunk of the wildcards' take that holds the neutral."""
-    return lambda wildcards: expand_chunks(pattern, wildcards.subject, wildcards.take)[0]
+    return lambda wildcards: of_chunks(pattern, wildcards)[0]
 
 
-def expand_chunks(pattern, subject, take):
-    """`pattern` for every chunk of a take; other wildcards of the pattern are kept."""
+def near_chunks(wildcards, reach):
+    """Chunks of the wildcards' take with a frame at most `reach` frames from the wildcards' chunk."""
+    frames = frames_in(wildcards.chunk)
     return [
-        pattern.replace("{subject}", subject).replace("{take}", take).replace("{chunk}", chunk)
-        for chunk in chunks(subject, take)
+        chunk
+        for chunk in chunks(wildcards)
+        if frames_in(chunk)[0] <= frames[-1] + reach and frames_in(chunk)[-1] >= frames[0] - reach
     ]
 
 
 def source_of(wildcards):
     """Where the images of a take lie: what the sheet says, or the studio's capture folder."""
     take = take_of(wildcards)
-    if take.source == STUDIO:
-        return f"{R}/captures/{take.subject}/{take.take}"
-    return take.source
+    return fill(P.capture_folder, take) if take.source == STUDIO else take.source
 
 
-def mono_inputs(wildcards):
-    """Inputs of a job that reads the monocular images of a chunk (use with `unpack`)."""
-    folder = f"{R}/takes/{wildcards.subject}/{wildcards.take}"
-    inputs = {"manifest": f"{folder}/capture/{wildcards.chunk}.json"}
-    if take_of(wildcards).role == "tattoo":
-        inputs["inpainted"] = f"{folder}/inpaint/{wildcards.chunk}"
-    return inputs
+def mono_patterns(wildcards):
+    """What a job waits for that reads monocular images: manifests, and inpainted frames of a tattoo."""
+    inpainted = take_of(wildcards).role == "tattoo"
+    return [P.manifest, P.inpainted] if inpainted else [P.manifest]
+
+
+def mono_images(wildcards):
+    """Inputs of a job that reads the monocular images of a whole take."""
+    return [path for part in mono_patterns(wildcards) for path in of_chunks(part, wildcards)]
+
+
+def chunk_images(wildcards):
+    """Inputs of a job that reads the monocular images of a chunk."""
+    return [fill(part, wildcards, chunk=wildcards.chunk) for part in mono_patterns(wildcards)]
 
 
 def mono_source(wildcards):
-    """What `open_frames` opens for the monocular images: inpainted frames of a tattoo take."""
+    """What `open_frames` opens for the monocular images of a whole take."""
     if take_of(wildcards).role == "tattoo":
-        return f"{R}/takes/{wildcards.subject}/{wildcards.take}/inpaint/{wildcards.chunk}"
+        return of_chunks(P.inpainted, wildcards)
     return source_of(wildcards)
+
+
+def chunk_source(wildcards):
+    """What `open_frames` opens for the monocular images of a chunk."""
+    if take_of(wildcards).role == "tattoo":
+        return fill(P.inpainted, wildcards, chunk=wildcards.chunk)
+    return source_of(wildcards)
+
+
+def chunk_frames(wildcards):
+    """Frame numbers of the wildcards' chunk."""
+    return frames_in(wildcards.chunk)
+
+
+def first_frame(wildcards):
+    """Number of the take's first frame: the neutral."""
+    return take_of(wildcards).first
+
+
+def take_span(wildcards):
+    """First and last frame of the wildcards' take."""
+    return [take_of(wildcards).first, take_of(wildcards).last]
+
+
+def take_fps(wildcards):
+    """Frames a second of the wildcards' take."""
+    return take_of(wildcards).fps
 
 
 def tracker_of(wildcards):
     """The tracker's face model for a subject: their own, made from a scan, or everybody's."""
     if wildcards.subject in CONFIG.tracking.scans:
-        return f"{R}/subjects/{wildcards.subject}/tracker.npz"
-    return f"{R}/face/tracker.npz"
-
-
-def mono_images(wildcards):
-    """Checked manifests of all chunks of a take, and its inpainted frames if it has a tattoo."""
-    folder = R + "/takes/{subject}/{take}"
-    name = (wildcards.subject, wildcards.take)
-    inputs = expand_chunks(folder + "/capture/{chunk}.json", *name)
-    if take_of(wildcards).role == "tattoo":
-        inputs += expand_chunks(folder + "/inpaint/{chunk}", *name)
-    return inputs
-
-
-def mono_sources(wildcards):
-    """What `open_frames` opens for the monocular images of a whole take."""
-    if take_of(wildcards).role == "tattoo":
-        pattern = R + "/takes/{subject}/{take}/inpaint/{chunk}"
-        return expand_chunks(pattern, wildcards.subject, wildcards.take)
-    return source_of(wildcards)
+        return P.own_tracker.format(subject=wildcards.subject)
+    return P.tracker
 
 
 def mono_camera(wildcards):

@@ -7,10 +7,7 @@ def contour_labels(wildcards):
     """Contours drawn on frames of the take's monocular camera."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        folder = f"{R}/captures/{take.name}/labels/contours"
-        return [
-            f"{folder}/{camera}/{frame:06d}.json" for camera, frame in studio_contour_labels(take)
-        ]
+        return [path for path in studio_label_files(take) if "/labels/contours/" in path]
     labels = label_paths(take.source, mono_camera(wildcards))
     return [str(path) for frame, path in labels.items() if take.first <= frame <= take.last]
 
@@ -22,13 +19,11 @@ def tracked_lips(wildcards):
     """
     if CONFIG.contours.detector.kind in ("boosted", "landmarks"):
         return {}
-    subject, take = wildcards.subject, wildcards.take
-    parts = [wildcards.chunk] if "chunk" in wildcards.keys() else chunks(subject, take)
-    folder = f"{R}/takes/{subject}/{take}/tracking"
+    parts = [wildcards.chunk] if "chunk" in wildcards.keys() else chunks(wildcards)
     return {
         "tracker": tracker_of(wildcards),
-        "fit": f"{folder}/fit.npz",
-        "coarse": [f"{folder}/C/{chunk}.npy" for chunk in parts],
+        "fit": fill(P.fit, wildcards),
+        "coarse": [fill(P.coarse, wildcards, chunk=chunk) for chunk in parts],
     }
 
 
@@ -37,22 +32,22 @@ rule contour_detector:
     input:
         unpack(tracked_lips),
         images=mono_images,
-        landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
+        landmarks=per_chunk(P.landmarks),
         labels=contour_labels,
     output:
-        detector=R + "/takes/{subject}/{take}/contours/detector.npz",
-        quality=R + "/takes/{subject}/{take}/contours/quality/labels.tsv",
+        detector=P.contour_detector,
+        quality=P.label_quality,
     log:
-        R + "/logs/contour_detector/{subject}-{take}.log",
+        P.log("contour_detector", "take"),
     benchmark:
-        R + "/benchmarks/contour_detector/{subject}-{take}.tsv"
+        P.benchmark("contour_detector", "take")
     resources:
         mem_mb=1500,
         runtime=30,
     params:
         cfg=cfg_of("contours.detector"),
         code=code_of("contours/contour_detector"),
-        source=mono_sources,
+        source=mono_source,
         capture=source_of,
         camera=mono_camera,
     script:
@@ -62,25 +57,25 @@ rule contour_detector:
 rule contours:
     """Draws the likelihood maps of a chunk: contours/{chunk}/<frame>.exr, inner and outer."""
     input:
-        unpack(mono_inputs),
         unpack(tracked_lips),
-        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
-        detector=R + "/takes/{subject}/{take}/contours/detector.npz",
+        images=chunk_images,
+        landmarks=P.landmarks,
+        detector=P.contour_detector,
     output:
-        maps=directory(R + "/takes/{subject}/{take}/contours/{chunk}"),
-        quality=R + "/takes/{subject}/{take}/contours/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/contours/overlay/{chunk}.png",
+        maps=directory(P.maps),
+        quality=P.contours_quality,
+        overlay=P.contours_overlay,
     log:
-        R + "/logs/contours/{subject}-{take}-{chunk}.log",
+        P.log("contours", "chunk"),
     benchmark:
-        R + "/benchmarks/contours/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("contours", "chunk")
     resources:
         mem_mb=1000,
         runtime=60,
     params:
         cfg=cfg_of("contours.maps"),
         code=code_of("contours/contours"),
-        source=mono_source,
+        source=chunk_source,
         capture=source_of,
         camera=mono_camera,
     script:

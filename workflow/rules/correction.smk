@@ -4,38 +4,35 @@
 rule layers:
     """Nine numbers a triangle of the mask for every frame of a chunk: layers/{chunk}.npz."""
     input:
-        accurate=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",
-        accurate_quality=R + "/takes/{subject}/{take}/multiview/quality/{chunk}.tsv",
-        accurate_neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        correspondence=R + "/subjects/{subject}/correspondence.npz",
+        accurate=P.accurate,
+        accurate_quality=P.multiview_quality,
+        accurate_neutral=P.neutral,
+        coarse=P.coarse,
+        fit=P.fit,
+        correspondence=P.correspondence,
         tracker=tracker_of,
     output:
-        layers=R + "/takes/{subject}/{take}/correction/layers/{chunk}.npz",
-        quality=R + "/takes/{subject}/{take}/correction/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/correction/overlay/{chunk}.png",
+        layers=P.layers,
+        quality=P.correction_quality,
+        overlay=P.correction_overlay,
     log:
-        R + "/logs/layers/{subject}-{take}-{chunk}.log",
+        P.log("layers", "chunk"),
     benchmark:
-        R + "/benchmarks/layers/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("layers", "chunk")
     resources:
         mem_mb=1500,
         runtime=20,
     params:
         cfg=cfg_of("correction.layers"),
         code=code_of("correction/layers"),
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
     script:
         "../scripts/correction/layers.py"
 
 
-NEUTRAL_PAIR = R + "/takes/{subject}/{take}/correction/neutral_pair.npz"
-
-
 def neutral_pair_of(subject):
     """The neutral pair of a subject: that of their reference take."""
-    return NEUTRAL_PAIR.format(subject=subject, take=takes("tattoo", subject)[0].take)
+    return P.neutral_pair.format(subject=subject, take=takes("tattoo", subject)[0].take)
 
 
 def neutral_frame(wildcards):
@@ -47,7 +44,7 @@ def neutral_frame(wildcards):
 def neutral_of_take(wildcards):
     """The neutral pair of a video that has a neutral frame (use with `unpack`)."""
     marked = take_of(wildcards).name in CONFIG.correction.neutral_frames
-    return {"neutral_of_take": NEUTRAL_PAIR.format(**wildcards)} if marked else {}
+    return {"neutral_of_take": P.neutral_pair.format(**wildcards)} if marked else {}
 
 
 def neutral_takes():
@@ -61,21 +58,21 @@ def neutral_takes():
 rule neutral_pair:
     """Coarse and accurate neutral of a take: neutral_pair.npz (Lips16 4.2, D of eq. 1)."""
     input:
-        template=R + "/face/template.npz",
+        template=P.template,
         tracker=tracker_of,
-        accurate=of_reference_take(R + "/takes/{subject}/{take}/multiview/neutral.npz"),
-        coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
-        correspondence=R + "/subjects/{subject}/correspondence.npz",
-        identity=R + "/subjects/{subject}/identity.npz",
+        accurate=of_reference_take(P.neutral),
+        coarse=per_chunk(P.coarse),
+        fit=P.fit,
+        features=per_chunk(P.features),
+        correspondence=P.correspondence,
+        identity=P.identity,
     output:
-        pair=NEUTRAL_PAIR,
-        overlay=R + "/takes/{subject}/{take}/correction/overlay/neutral_pair.png",
+        pair=P.neutral_pair,
+        overlay=P.neutral_pair_overlay,
     log:
-        R + "/logs/neutral_pair/{subject}-{take}.log",
+        P.log("neutral_pair", "take"),
     benchmark:
-        R + "/benchmarks/neutral_pair/{subject}-{take}.tsv"
+        P.benchmark("neutral_pair", "take")
     resources:
         mem_mb=1000,
         runtime=20,

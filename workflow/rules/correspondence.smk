@@ -14,29 +14,27 @@ def reference_take(wildcards):
 
 def of_reference_take(pattern):
     """Input function: `pattern` for the first chunk of the subject's reference take."""
-    return lambda wildcards: expand_chunks(
-        pattern, wildcards.subject, reference_take(wildcards).take
-    )[0]
+    return lambda wildcards: of_chunks(pattern, reference_take(wildcards))[0]
 
 
 rule correspondence:
     """Lays the coarse neutral over the accurate one and binds every triangle: correspondence.npz."""
     input:
-        template=R + "/face/template.npz",
+        template=P.template,
         tracker=tracker_of,
-        accurate=of_reference_take(R + "/takes/{subject}/{take}/multiview/neutral.npz"),
-        coarse=of_reference_take(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
-        fit=of_reference_take(R + "/takes/{subject}/{take}/tracking/fit.npz"),
-        landmarks=of_reference_take(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
-        image=of_reference_take(R + "/takes/{subject}/{take}/inpaint/{chunk}"),
+        accurate=of_reference_take(P.neutral),
+        coarse=of_reference_take(P.coarse),
+        fit=of_reference_take(P.fit),
+        landmarks=of_reference_take(P.landmarks),
+        image=of_reference_take(P.inpainted),
     output:
-        correspondence=R + "/subjects/{subject}/correspondence.npz",
-        quality=R + "/subjects/{subject}/correspondence/quality/neutral.tsv",
-        overlay=R + "/subjects/{subject}/correspondence/overlay/neutral.png",
+        correspondence=P.correspondence,
+        quality=P.correspondence_quality,
+        overlay=P.correspondence_overlay,
     log:
-        R + "/logs/correspondence/{subject}.log",
+        P.log("correspondence", "subject"),
     benchmark:
-        R + "/benchmarks/correspondence/{subject}.tsv"
+        P.benchmark("correspondence", "subject")
     resources:
         mem_mb=1000,
         runtime=20,

@@ -12,33 +12,20 @@ def database_takes():
     return found
 
 
-def all_chunks(pattern):
-    """Input function: `pattern` for every chunk of every take of the database."""
-    return lambda wildcards: [
-        path
-        for take in database_takes()
-        for path in expand_chunks(pattern, take.subject, take.take)
-    ]
-
-
 rule database:
     """Gathers features and layers of all subjects in one HDF5, with the split of every frame."""
     input:
-        layers=all_chunks(R + "/takes/{subject}/{take}/correction/layers/{chunk}.npz"),
-        features=all_chunks(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
-        correspondence=lambda wildcards: [
-            f"{R}/subjects/{subject}/correspondence.npz" for subject in subjects("tattoo")
-        ],
-        identity=lambda wildcards: [
-            f"{R}/subjects/{subject}/identity.npz" for subject in subjects("tattoo")
-        ],
+        layers=lambda wildcards: of_takes(P.layers, database_takes()),
+        features=lambda wildcards: of_takes(P.features, database_takes()),
+        correspondence=expand(P.correspondence, subject=subjects("tattoo")),
+        identity=expand(P.identity, subject=subjects("tattoo")),
         neutral_pair=lambda wildcards: list(map(neutral_pair_of, subjects("tattoo"))),
     output:
-        database=R + "/database/lips.h5",
+        database=P.database,
     log:
-        R + "/logs/database.log",
+        P.log("database", "run"),
     benchmark:
-        R + "/benchmarks/database.tsv"
+        P.benchmark("database", "run")
     resources:
         mem_mb=4000,
         runtime=60,
@@ -53,7 +40,7 @@ rule database:
                 "fps": take.fps,
                 "split": take.split,
                 "train": take.train_frames(),
-                "chunks": len(chunks(take.subject, take.take)),
+                "chunks": len(chunks(take)),
             }
             for take in database_takes()
         ],

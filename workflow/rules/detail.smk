@@ -1,6 +1,9 @@
-"""A finer sequence than C (Mono13 7): detail/flow/{chunk}.npy, in the topology of C.
+"""Sequences finer than C: corrective flow (Mono13 7), and relief from shading (Mono13 8).
 
-For the takes of `detail.takes`; no other stage reads it.
+Flow: detail/flow/, in the topology of C, for the takes of `detail.takes`. Relief: detail/relief/, in
+a subdivided topology, for the takes of `detail.relief.takes`, from the flow where a take has it, else
+from C. No other stage reads them. Relief is of each frame alone; a second rule averages the normals
+over a window of frames, which reaches into the neighbouring chunks.
 """
 
 
@@ -11,40 +14,177 @@ def detail_takes():
 
 def detail_outputs():
     """Files of every take that is refined."""
-    return [
+    flow = of_takes(P.flow, detail_takes())
+    return flow + [
         path
-        for take in detail_takes()
-        for path in expand_chunks(
-            R + "/takes/{subject}/{take}/detail/flow/{chunk}.npy", take.subject, take.take
-        )
+        for pattern in (P.relief_light, P.relief, P.relief_meshes)
+        for path in of_takes(pattern, relief_takes())
     ]
+
+
+def relief_takes():
+    """Rows of the takes that get relief, in the order of the configuration."""
+    return [_TAKES[name] for name in CONFIG.detail.relief.takes]
+
+
+def detail_residuals():
+    """Residuals before and after the flow, and before and after the relief."""
+    flow = residuals_of(detail_takes(), ("before_flow", "flow"))
+    return flow + residuals_of(relief_takes(), ("before_relief", "relief"))
+
+
+def mesh_before_relief(wildcards):
+    """Pattern of the chunks of the sequence that the relief is added to."""
+    return P.flow if take_of(wildcards) in detail_takes() else P.coarse
+
+
+def meshes_before_relief(wildcards):
+    """All chunks of that sequence."""
+    return of_chunks(mesh_before_relief(wildcards), wildcards)
+
+
+def chunk_before_relief(wildcards):
+    """The wildcards' chunk of that sequence, as a list of one."""
+    return [mesh_before_relief(wildcards).format(**wildcards)]
+
+
+def near_reliefs(wildcards):
+    """Relief of the chunks into which the window about a chunk's frames reaches."""
+    near = near_chunks(wildcards, CONFIG.detail.relief.window // 2)
+    return [fill(P.relief, wildcards, chunk=chunk) for chunk in near]
 
 
 rule detail_flow:
     """Corrects C of a chunk by flow from textured to true frames: detail/flow/{chunk}.npy."""
     input:
-        unpack(take_images),
+        images=mono_images,
         tracker=tracker_of,
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
+        fit=P.fit,
+        coarse=per_chunk(P.coarse),
     output:
-        meshes=R + "/takes/{subject}/{take}/detail/flow/{chunk}.npy",
-        quality=R + "/takes/{subject}/{take}/detail/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/detail/overlay/{chunk}.png",
-        start=R + "/takes/{subject}/{take}/tracking/residuals/before_flow/{chunk}.tsv",
-        flow=R + "/takes/{subject}/{take}/tracking/residuals/flow/{chunk}.tsv",
+        meshes=P.flow,
+        quality=P.flow_quality,
+        overlay=P.flow_overlay,
+        start=P.residuals.replace("{step}", "before_flow"),
+        flow=P.residuals.replace("{step}", "flow"),
     log:
-        R + "/logs/detail_flow/{subject}-{take}-{chunk}.log",
+        P.log("detail_flow", "chunk"),
     benchmark:
-        R + "/benchmarks/detail_flow/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("detail_flow", "chunk")
     resources:
         mem_mb=2000,
         runtime=120,
     params:
         cfg=cfg_of("detail.face_px", "detail.flow", "detail.deformation", "detail.overlay_frames"),
         code=code_of("detail/detail_flow"),
-        source=take_source,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
-        span=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
+        source=mono_source,
+        frames=chunk_frames,
+        span=take_span,
     script:
         "../scripts/detail/detail_flow.py"
+
+
+rule relief_light:
+    """One light, albedo and noise of a take from its first frames: detail/relief/light.npz."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        fit=P.fit,
+        meshes=meshes_before_relief,
+    output:
+        light=P.relief_light,
+        topology=P.relief_topology,
+    log:
+        P.log("relief_light", "take"),
+    benchmark:
+        P.benchmark("relief_light", "take")
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        cfg=cfg_of(
+            "detail.relief.levels",
+            "detail.relief.face_px",
+            "detail.relief.light_frames",
+            "detail.relief.detail_mm",
+        ),
+        code=code_of("detail/relief_light"),
+        source=mono_source,
+        span=take_span,
+    script:
+        "../scripts/detail/relief_light.py"
+
+
+rule relief:
+    """Relief of each frame of a chunk: detail/relief/frames/{chunk}.npz."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        fit=P.fit,
+        meshes=chunk_before_relief,
+        light=P.relief_light,
+    output:
+        relief=P.relief,
+    log:
+        P.log("relief", "chunk"),
+    benchmark:
+        P.benchmark("relief", "chunk")
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        cfg=cfg_of(
+            "detail.relief.levels",
+            "detail.relief.face_px",
+            "detail.relief.detail_mm",
+            "detail.relief.curvature_sigma",
+            "detail.relief.displacement_sigma_mm",
+            "detail.relief.noise_floor",
+            "detail.relief.misplaced_mm",
+            "detail.relief.iterations",
+        ),
+        code=code_of("detail/relief"),
+        source=mono_source,
+        frames=chunk_frames,
+    script:
+        "../scripts/detail/relief.py"
+
+
+rule relief_meshes:
+    """Relief with averaged normals, as meshes and normal maps: detail/relief/{chunk}.npy."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        fit=P.fit,
+        meshes=chunk_before_relief,
+        light=P.relief_light,
+        reliefs=near_reliefs,
+    output:
+        meshes=P.relief_meshes,
+        maps=directory(P.normal_maps),
+        quality=P.relief_quality,
+        overlay=P.relief_overlay,
+        start=P.residuals.replace("{step}", "before_relief"),
+        after=P.residuals.replace("{step}", "relief"),
+    log:
+        P.log("relief_meshes", "chunk"),
+    benchmark:
+        P.benchmark("relief_meshes", "chunk")
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        cfg=cfg_of(
+            "detail.relief.levels",
+            "detail.relief.face_px",
+            "detail.relief.window",
+            "detail.relief.position_weight",
+            "detail.relief.map_px",
+            "detail.relief.overlay_frames",
+        ),
+        code=code_of("detail/relief_meshes"),
+        source=mono_source,
+        frames=chunk_frames,
+        span=take_span,
+    script:
+        "../scripts/detail/relief_meshes.py"

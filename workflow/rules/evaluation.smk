@@ -1,23 +1,111 @@
-"""Errors of every regressor on held-out frames, take by take (Lips16 6): evaluation/takes/.
+"""Errors of every regressor on held-out frames (Lips16 6): take by take, then all takes together.
 
-The only rules that read truth.
+The studio alone writes truth; besides it, only this file names it, and only its rules read it.
 """
+
+
+def truth_files(take):
+    """Vertices and triangles of a take's known truth; none where there is none."""
+    take = take_of(take)
+    if take.source == STUDIO:
+        folder = Path(fill(P.truth, take))
+    elif CONFIG.evaluation.truth:
+        folder = Path(CONFIG.evaluation.truth) / take.name
+    else:
+        return []
+    files = [folder / "vertices_mm.npy", folder / "triangles.npy"]
+    known = take.source == STUDIO or all(path.is_file() for path in files)
+    return [str(path) for path in files] if known else []
+
+
+def curve_files(take):
+    """The true expression weights of a take; none where they are not known."""
+    if take.source == STUDIO:
+        return [fill(P.truth, take) + "/weights.json"]
+    if not CONFIG.evaluation.truth:
+        return []
+    path = Path(CONFIG.evaluation.truth) / take.name / "weights.json"
+    return [str(path)] if path.is_file() else []
+
+
+def neutral_truth_files(subject):
+    """Truth of the take whose first frame is the subject's neutral, in the world of H."""
+    neutral = takes("tattoo", subject)
+    return truth_files(neutral[0]) if neutral else []
+
+
+def has_truth(take):
+    """Whether a take can be followed in known truth: it has one, and so has the neutral."""
+    return bool(truth_files(take) and neutral_truth_files(take.subject))
+
+
+def evaluated_takes():
+    """Takes with held-out frames of people with a correspondence, and with truth or H."""
+    people = set(subjects("tattoo"))
+    return [
+        take
+        for take in takes(("tattoo", "video"))
+        if take.test_frames() and take.subject in people
+        if take.role == "tattoo" or has_truth(take)
+    ]
+
+
+def reconstructed_takes():
+    """Takes whose H can be held against known truth."""
+    return [take for take in takes("tattoo") if has_truth(take)]
+
+
+def evaluated_models(subject):
+    """Model files to measure on a person's takes: their PS, MS, the GR without them, variants."""
+    options = CONFIG.evaluation
+    names = regressors_of(subject, trained_subjects())
+    variants = with_variants(names, options.variants, options.variants_of)
+    return expand(P.model, regressor=variants)
+
+
+def all_evaluated_models():
+    """Model files that some take is measured with."""
+    people = dict.fromkeys(take.subject for take in evaluated_takes())
+    return list(dict.fromkeys(path for person in people for path in evaluated_models(person)))
+
+
+def evaluate_inputs(wildcards):
+    """Inputs that depend on the role of the take and on whether its truth is known."""
+    take = take_of(wildcards)
+    inputs = {"models": evaluated_models(take.subject)}
+    if take.role == "tattoo":
+        inputs["layers"] = of_chunks(P.layers, take)
+    if has_truth(take):
+        neutral = takes("tattoo", take.subject)[0]
+        inputs["truth"] = truth_files(take)
+        if curve_files(take):
+            inputs["curves"] = curve_files(take)[0]
+        inputs["neutral_truth"] = neutral_truth_files(take.subject)
+        inputs["neutral_accurate"] = of_chunks(P.accurate, neutral)[0]
+    else:
+        inputs["accurate"] = of_chunks(P.accurate, take)
+    return inputs
+
+
+def takes_that_train():
+    """Tattoo takes with training frames."""
+    return [take for take in takes("tattoo") if take.train_frames()]
 
 
 rule lip_shapes:
     """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
     input:
-        tracker=R + "/face/tracker.npz",
-        correspondence=[f"{R}/subjects/{name}/correspondence.npz" for name in trained_subjects()],
-        accurate=of_training_chunks("multiview/H/{chunk}.npy"),
-        accurate_quality=of_training_chunks("multiview/quality/{chunk}.tsv"),
-        neutrals=of_takes(R + "/takes/{subject}/{take}/multiview/neutral.npz", takes_that_train()),
+        tracker=P.tracker,
+        correspondence=expand(P.correspondence, subject=trained_subjects()),
+        accurate=of_takes(P.accurate, takes_that_train()),
+        accurate_quality=of_takes(P.multiview_quality, takes_that_train()),
+        neutrals=of_takes(P.neutral, takes_that_train()),
     output:
-        shapes=R + "/evaluation/lip_shapes.npz",
+        shapes=P.lip_shapes,
     log:
-        R + "/logs/lip_shapes.log",
+        P.log("lip_shapes", "run"),
     benchmark:
-        R + "/benchmarks/lip_shapes.tsv"
+        P.benchmark("lip_shapes", "run")
     resources:
         mem_mb=3000,
         runtime=30,
@@ -29,7 +117,7 @@ rule lip_shapes:
             {
                 "take": take.name,
                 "train": take.train_frames(),
-                "chunks": len(chunks(take.subject, take.take)),
+                "chunks": len(chunks(take)),
             }
             for take in takes_that_train()
         ],
@@ -43,25 +131,25 @@ rule evaluate:
         unpack(evaluate_inputs),
         unpack(neutral_of_take),
         tracker=tracker_of,
-        template=R + "/face/template.npz",
-        correspondence=R + "/subjects/{subject}/correspondence.npz",
-        identity=R + "/subjects/{subject}/identity.npz",
+        template=P.template,
+        correspondence=P.correspondence,
+        identity=P.identity,
         neutral_pair=lambda wildcards: neutral_pair_of(wildcards.subject),
-        shapes=R + "/evaluation/lip_shapes.npz",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        coarse=per_chunk(R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy"),
-        features=per_chunk(R + "/takes/{subject}/{take}/correction/features/{chunk}.npz"),
+        shapes=P.lip_shapes,
+        fit=P.fit,
+        coarse=per_chunk(P.coarse),
+        features=per_chunk(P.features),
     output:
-        measures=EVALUATED + "/measures.tsv",
-        seconds=EVALUATED + "/seconds.tsv",
-        sums=EVALUATED + "/sums.npz",
-        frames=EVALUATED + "/frames.tsv",
-        maps=EVALUATED + "/maps.npz",
-        quality=EVALUATED + "/quality.tsv",
+        measures=P.evaluated + "/measures.tsv",
+        seconds=P.evaluated + "/seconds.tsv",
+        sums=P.evaluated + "/sums.npz",
+        frames=P.evaluated + "/frames.tsv",
+        maps=P.evaluated + "/maps.npz",
+        quality=P.evaluated + "/quality.tsv",
     log:
-        R + "/logs/evaluate/{subject}-{take}.log",
+        P.log("evaluate", "take"),
     benchmark:
-        R + "/benchmarks/evaluate/{subject}-{take}.tsv"
+        P.benchmark("evaluate", "take")
     resources:
         mem_mb=3000,
         runtime=120,
@@ -76,8 +164,8 @@ rule evaluate:
         ),
         code=code_of("evaluation/evaluate"),
         frames=lambda wildcards: take_of(wildcards).test_frames(),
-        first=lambda wildcards: take_of(wildcards).first,
-        fps=lambda wildcards: take_of(wildcards).fps,
+        first=first_frame,
+        fps=take_fps,
     script:
         "../scripts/evaluation/evaluate.py"
 
@@ -85,25 +173,25 @@ rule evaluate:
 rule evaluate_reconstruction:
     """Measures H itself against known truth: surface error, vertex error, drift."""
     input:
-        template=R + "/face/template.npz",
-        correspondence=R + "/subjects/{subject}/correspondence.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        accurate=per_chunk(R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"),
-        truth=lambda wildcards: truth_files(wildcards.subject, wildcards.take),
+        template=P.template,
+        correspondence=P.correspondence,
+        cameras=P.cameras,
+        accurate=per_chunk(P.accurate),
+        truth=truth_files,
     output:
-        measures=RECONSTRUCTED + "/measures.tsv",
-        sums=RECONSTRUCTED + "/sums.npz",
+        measures=P.reconstructed + "/measures.tsv",
+        sums=P.reconstructed + "/sums.npz",
     log:
-        R + "/logs/evaluate_reconstruction/{subject}-{take}.log",
+        P.log("evaluate_reconstruction", "take"),
     benchmark:
-        R + "/benchmarks/evaluate_reconstruction/{subject}-{take}.tsv"
+        P.benchmark("evaluate_reconstruction", "take")
     resources:
         mem_mb=3000,
         runtime=120,
     params:
         cfg=cfg_of("evaluation.reference", "evaluation.measures"),
         code=code_of("evaluation/evaluate_reconstruction"),
-        first=lambda wildcards: take_of(wildcards).first,
+        first=first_frame,
     script:
         "../scripts/evaluation/evaluate_reconstruction.py"
 
@@ -112,48 +200,110 @@ rule evaluation_figures:
     """Renders, surface stretch and errors from front and side, curves over time (fig. 9 to 16)."""
     input:
         images=mono_images,
-        maps=EVALUATED + "/maps.npz",
-        frames=EVALUATED + "/frames.tsv",
+        maps=P.evaluated + "/maps.npz",
+        frames=P.evaluated + "/frames.tsv",
     output:
         maps=report(
-            EVALUATED + "/error_maps.png",
+            P.evaluated + "/error_maps.png",
             category="Errors",
             subcategory="Error maps",
             labels={"take": "{subject}/{take}"},
             caption="../report/error_maps.rst",
         ),
         renders=report(
-            EVALUATED + "/renders.png",
+            P.evaluated + "/renders.png",
             category="Errors",
             subcategory="Renders",
             labels={"take": "{subject}/{take}"},
             caption="../report/renders.rst",
         ),
         stretch=report(
-            EVALUATED + "/stretch.png",
+            P.evaluated + "/stretch.png",
             category="Errors",
             subcategory="Surface stretch",
             labels={"take": "{subject}/{take}"},
             caption="../report/stretch.rst",
         ),
         curves=report(
-            EVALUATED + "/curves.png",
+            P.evaluated + "/curves.png",
             category="Errors",
             subcategory="Over time",
             labels={"take": "{subject}/{take}"},
             caption="../report/curves.rst",
         ),
     log:
-        R + "/logs/evaluation_figures/{subject}-{take}.log",
+        P.log("evaluation_figures", "take"),
     benchmark:
-        R + "/benchmarks/evaluation_figures/{subject}-{take}.tsv"
+        P.benchmark("evaluation_figures", "take")
     resources:
         mem_mb=1500,
         runtime=20,
     params:
         cfg=cfg_of("evaluation.figures"),
         code=code_of("evaluation/evaluation_figures"),
-        source=mono_sources,
+        source=mono_source,
         camera=mono_camera,
     script:
         "../scripts/evaluation/evaluation_figures.py"
+
+
+rule measures:
+    """Joins the measures of all takes, and the takes together: measures.tsv, table1.tsv."""
+    input:
+        takes=of_takes(P.evaluated + "/sums.npz", evaluated_takes()),
+        seconds=of_takes(P.evaluated + "/seconds.tsv", evaluated_takes()),
+        frames=of_takes(P.evaluated + "/frames.tsv", evaluated_takes()),
+        reconstructions=of_takes(P.reconstructed + "/sums.npz", reconstructed_takes()),
+        curves=[path.replace(".h5", ".cv.tsv") for path in all_evaluated_models()],
+        tables=of_takes(P.evaluated + "/measures.tsv", evaluated_takes())
+        + of_takes(P.reconstructed + "/measures.tsv", reconstructed_takes()),
+    output:
+        measures=report(
+            P.measures,
+            category="Tables",
+            labels={"table": "all measures"},
+            caption="../report/measures.rst",
+        ),
+        kinds=report(
+            P.kinds,
+            category="Tables",
+            labels={"table": "kinds of mouth shapes"},
+            caption="../report/kinds.rst",
+        ),
+        seconds=P.seconds,
+        comparisons=P.comparisons,
+        table2=P.table2,
+        table3=P.table3,
+        estimators=P.estimators,
+        table1=report(
+            P.table1,
+            category="Tables",
+            labels={"table": "table 1"},
+            caption="../report/table1.rst",
+        ),
+        figure16=report(
+            P.figure16,
+            category="Errors",
+            subcategory="Over time",
+            labels={"take": "RBF network against affine map"},
+            caption="../report/figure16.rst",
+        ),
+        image=report(
+            P.table1_figure,
+            category="Tables",
+            labels={"table": "table 1, image"},
+            caption="../report/table1.rst",
+        ),
+    log:
+        P.log("measures", "run"),
+    benchmark:
+        P.benchmark("measures", "run")
+    resources:
+        mem_mb=1500,
+        runtime=20,
+    params:
+        cfg=cfg_of("evaluation.measures", "training.regressor"),
+        code=code_of("evaluation/measures"),
+        takes=[{"take": take.name, "role": take.role} for take in evaluated_takes()],
+    script:
+        "../scripts/evaluation/measures.py"

@@ -4,29 +4,29 @@
 rule features:
     """Measures the contours from the coarse meshes of a chunk: features/{chunk}.npz (F, M)."""
     input:
-        unpack(mono_inputs),
+        images=chunk_images,
         # Everybody's model, also for those with a scan: shape features have one basis for all people.
-        model=R + "/face/tracker.npz",
-        identity=R + "/subjects/{subject}/identity.npz",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        coarse=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
-        maps=R + "/takes/{subject}/{take}/contours/{chunk}",
+        model=P.tracker,
+        identity=P.identity,
+        fit=P.fit,
+        coarse=P.coarse,
+        maps=P.maps,
     output:
-        features=R + "/takes/{subject}/{take}/correction/features/{chunk}.npz",
-        quality=R + "/takes/{subject}/{take}/correction/features/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/correction/features/overlay/{chunk}.png",
+        features=P.features,
+        quality=P.features_quality,
+        overlay=P.features_overlay,
     log:
-        R + "/logs/features/{subject}-{take}-{chunk}.log",
+        P.log("features", "chunk"),
     benchmark:
-        R + "/benchmarks/features/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("features", "chunk")
     resources:
         mem_mb=1000,
         runtime=30,
     params:
         cfg=cfg_of("features.shape", "features.contours"),
         code=code_of("features/features"),
-        source=mono_source,
+        source=chunk_source,
         camera=mono_camera,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
     script:
         "../scripts/features/features.py"

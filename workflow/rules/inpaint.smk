@@ -6,32 +6,25 @@ def plain_take(wildcards):
     return takes("plain", wildcards.subject)[0]
 
 
-def plain_path(pattern):
-    """Input function: `pattern` with the subject's plain take in place of {plain} and {chunk}."""
-
-    def path(wildcards):
-        take = plain_take(wildcards)
-        chunk = chunks(take.subject, take.take)[0]
-        name = pattern.replace("{subject}", take.subject).replace("{plain}", take.take)
-        return name.replace("{chunk}", chunk)
-
-    return path
+def of_plain_take(pattern):
+    """Input function: `pattern` for the first chunk of the subject's plain take."""
+    return lambda wildcards: of_chunks(pattern, plain_take(wildcards))[0]
 
 
 rule plain_texture:
     """The texture of the lips without tattoo: plain_texture.exr, from all cameras of the plain take."""
     input:
-        template=R + "/face/template.npz",
-        neutral=plain_path(R + "/takes/{subject}/{plain}/multiview/neutral.npz"),
-        cameras=plain_path(R + "/takes/{subject}/{plain}/cameras"),
-        manifest=plain_path(R + "/takes/{subject}/{plain}/capture/{chunk}.json"),
+        template=P.template,
+        neutral=of_plain_take(P.neutral),
+        cameras=of_plain_take(P.cameras),
+        manifest=of_plain_take(P.manifest),
     output:
-        texture=R + "/subjects/{subject}/plain_texture.exr",
-        overlay=R + "/subjects/{subject}/overlay/plain_texture.png",
+        texture=P.plain_texture,
+        overlay=P.plain_texture_overlay,
     log:
-        R + "/logs/plain_texture/{subject}.log",
+        P.log("plain_texture", "subject"),
     benchmark:
-        R + "/benchmarks/plain_texture/{subject}.tsv"
+        P.benchmark("plain_texture", "subject")
     resources:
         mem_mb=1500,
         runtime=20,
@@ -48,25 +41,25 @@ rule plain_texture:
 rule inpaint_reference:
     """The tattooed neutral as the frontal camera sees it, and where the tattoo is: reference.exr."""
     input:
-        template=R + "/face/template.npz",
-        plain=R + "/subjects/{subject}/plain_texture.exr",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        template=P.template,
+        plain=P.plain_texture,
+        neutral=P.neutral,
+        cameras=P.cameras,
+        manifest=first_chunk(P.manifest),
     output:
-        reference=R + "/takes/{subject}/{take}/inpaint/reference.exr",
-        overlay=R + "/takes/{subject}/{take}/inpaint/overlay/reference.png",
+        reference=P.tattoo_reference,
+        overlay=P.tattoo_reference_overlay,
     log:
-        R + "/logs/inpaint_reference/{subject}-{take}.log",
+        P.log("inpaint_reference", "take"),
     benchmark:
-        R + "/benchmarks/inpaint_reference/{subject}-{take}.tsv"
+        P.benchmark("inpaint_reference", "take")
     resources:
         mem_mb=1500,
         runtime=20,
     params:
         cfg=cfg_of("inpaint.domain", "inpaint.mask", "capture.frontal_camera"),
         code=code_of("inpaint/inpaint_reference"),
-        neutral=lambda wildcards: take_of(wildcards).first,
+        neutral=first_frame,
         source=source_of,
     script:
         "../scripts/inpaint/inpaint_reference.py"
@@ -75,20 +68,20 @@ rule inpaint_reference:
 rule inpaint:
     """Frames of the frontal camera without tattoo: inpaint/{chunk}/<frame>.png (Lips16 3.2.1)."""
     input:
-        template=R + "/face/template.npz",
-        plain=R + "/subjects/{subject}/plain_texture.exr",
-        reference=R + "/takes/{subject}/{take}/inpaint/reference.exr",
-        meshes=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
+        template=P.template,
+        plain=P.plain_texture,
+        reference=P.tattoo_reference,
+        meshes=P.accurate,
+        cameras=P.cameras,
+        manifest=P.manifest,
     output:
-        frames=directory(R + "/takes/{subject}/{take}/inpaint/{chunk}"),
-        quality=R + "/takes/{subject}/{take}/inpaint/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/inpaint/overlay/{chunk}.png",
+        frames=directory(P.inpainted),
+        quality=P.inpaint_quality,
+        overlay=P.inpaint_overlay,
     log:
-        R + "/logs/inpaint/{subject}-{take}-{chunk}.log",
+        P.log("inpaint", "chunk"),
     benchmark:
-        R + "/benchmarks/inpaint/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("inpaint", "chunk")
     resources:
         mem_mb=1500,
         runtime=lambda wildcards: 10 + len(frames_in(wildcards.chunk)) // 10,
@@ -101,7 +94,7 @@ rule inpaint:
             "capture.frontal_camera",
         ),
         code=code_of("inpaint/inpaint"),
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
         source=source_of,
     script:
         "../scripts/inpaint/inpaint.py"

@@ -7,9 +7,7 @@ among them (landmarks/key_frames.npz), and between these flow corrects (landmark
 from vermilion.landmarks.labels import label_files
 from vermilion.landmarks.networks import FACE_FILE, LANDMARK_FILE
 
-LANDMARK_MODEL = R + "/landmarks/model.npz"
-LANDMARKS = R + "/takes/{subject}/{take}/landmarks"
-DETECTED = LANDMARKS + ("" if CONFIG.landmarks.correction.mode == "raw" else "/raw")
+DETECTED = P.landmarks_folder + ("" if CONFIG.landmarks.correction.mode == "raw" else "/raw")
 
 
 def detector_files(wildcards):
@@ -17,12 +15,12 @@ def detector_files(wildcards):
     kind, folder = CONFIG.landmarks.detector, Path(CONFIG.landmarks.models)
     if kind == "onnx":
         return [str(folder / FACE_FILE), str(folder / LANDMARK_FILE)]
-    return [LANDMARK_MODEL] if kind == "trained" else []
+    return [P.landmark_model] if kind == "trained" else []
 
 
 def detector_path(wildcards):
     """The folder of networks or the file of the regressor."""
-    return CONFIG.landmarks.models if CONFIG.landmarks.detector == "onnx" else LANDMARK_MODEL
+    return CONFIG.landmarks.models if CONFIG.landmarks.detector == "onnx" else P.landmark_model
 
 
 def landmark_csv(wildcards, camera):
@@ -61,8 +59,7 @@ def landmark_model_inputs(wildcards):
     """Checked frames of the training takes, and their labels."""
     inputs = []
     for take in training_takes():
-        pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
-        inputs += expand_chunks(pattern, take.subject, take.take) + landmark_label_files(take)
+        inputs += of_chunks(P.manifest, take) + landmark_label_files(take)
     return inputs
 
 
@@ -71,9 +68,9 @@ rule landmark_model:
     input:
         landmark_model_inputs,
     output:
-        multiext(R + "/landmarks/", model="model.npz", overlay="overlay.png"),
+        multiext(P.landmark_models, model="model.npz", overlay="overlay.png"),
     log:
-        R + "/logs/landmark_model.log",
+        P.log("landmark_model", "run"),
     cache: True
     resources:
         mem_mb=2500,
@@ -113,7 +110,7 @@ def key_frame_csv(wildcards):
 rule landmarks:
     """Finds the landmarks of a chunk of the monocular images, each by itself."""
     input:
-        unpack(mono_inputs),
+        images=chunk_images,
         detector=detector_files,
         csv=landmark_csv_input,
     output:
@@ -121,18 +118,18 @@ rule landmarks:
         quality=DETECTED + "/quality/{chunk}.tsv",
         overlay=DETECTED + "/overlay/{chunk}.png",
     log:
-        R + "/logs/landmarks/{subject}-{take}-{chunk}.log",
+        P.log("landmarks", "chunk"),
     benchmark:
-        R + "/benchmarks/landmarks/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("landmarks", "chunk")
     resources:
         mem_mb=1000,
         runtime=60,
     params:
         cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
         code=code_of("landmarks/landmarks"),
-        source=mono_source,
+        source=chunk_source,
         camera=mono_camera,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
         model=detector_path,
     script:
         "../scripts/landmarks/landmarks.py"
@@ -148,19 +145,19 @@ if CONFIG.landmarks.correction.mode == "flow":
             labels=given_landmark_labels,
             csv=key_frame_csv,
         output:
-            key_frames=LANDMARKS + "/key_frames.npz",
-            table=LANDMARKS + "/key_frames.tsv",
+            key_frames=P.key_frames,
+            table=P.key_frames_table,
         log:
-            R + "/logs/landmarks_key_frames/{subject}-{take}.log",
+            P.log("landmarks_key_frames", "take"),
         benchmark:
-            R + "/benchmarks/landmarks_key_frames/{subject}-{take}.tsv"
+            P.benchmark("landmarks_key_frames", "take")
         resources:
             mem_mb=1000,
             runtime=60,
         params:
             cfg=cfg_of("landmarks.key_frames", "landmarks.correction"),
             code=code_of("landmarks/landmarks_key_frames"),
-            source=mono_sources,
+            source=mono_source,
             camera=mono_camera,
         script:
             "../scripts/landmarks/landmarks_key_frames.py"
@@ -170,24 +167,24 @@ if CONFIG.landmarks.correction.mode == "flow":
         input:
             images=mono_images,
             landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
-            key_frames=LANDMARKS + "/key_frames.npz",
+            key_frames=P.key_frames,
         output:
-            landmarks=LANDMARKS + "/{chunk}.npz",
-            quality=LANDMARKS + "/quality/{chunk}.tsv",
-            overlay=LANDMARKS + "/overlay/{chunk}.png",
+            landmarks=P.landmarks,
+            quality=P.landmarks_folder + "/quality/{chunk}.tsv",
+            overlay=P.landmarks_folder + "/overlay/{chunk}.png",
         log:
-            R + "/logs/landmarks_corrected/{subject}-{take}-{chunk}.log",
+            P.log("landmarks_corrected", "chunk"),
         benchmark:
-            R + "/benchmarks/landmarks_corrected/{subject}-{take}-{chunk}.tsv"
+            P.benchmark("landmarks_corrected", "chunk")
         resources:
             mem_mb=1000,
             runtime=120,
         params:
             cfg=cfg_of("landmarks.correction"),
             code=code_of("landmarks/landmarks_corrected"),
-            source=mono_sources,
+            source=mono_source,
             camera=mono_camera,
-            frames=lambda wildcards: frames_in(wildcards.chunk),
+            frames=chunk_frames,
         script:
             "../scripts/landmarks/landmarks_corrected.py"
 
@@ -195,16 +192,16 @@ if CONFIG.landmarks.correction.mode == "flow":
 rule landmarks_views:
     """Finds the landmarks of the neutral in every camera of a rig: views_neutral.npz."""
     input:
-        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
-        cameras=R + "/takes/{subject}/{take}/cameras",
+        manifest=first_chunk(P.manifest),
+        cameras=P.cameras,
         detector=detector_files,
     output:
-        views=R + "/takes/{subject}/{take}/landmarks/views_neutral.npz",
-        overlay=R + "/takes/{subject}/{take}/landmarks/overlay/views_neutral.png",
+        views=P.views_neutral,
+        overlay=P.views_overlay,
     log:
-        R + "/logs/landmarks_views/{subject}-{take}.log",
+        P.log("landmarks_views", "take"),
     benchmark:
-        R + "/benchmarks/landmarks_views/{subject}-{take}.tsv"
+        P.benchmark("landmarks_views", "take")
     resources:
         mem_mb=1000,
         runtime=30,
@@ -212,7 +209,7 @@ rule landmarks_views:
         cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
         code=code_of("landmarks/landmarks_views"),
         source=source_of,
-        frame=lambda wildcards: take_of(wildcards).first,
+        frame=first_frame,
         model=detector_path,
         csv=lambda wildcards: landmark_csv(wildcards, "{camera}"),
     script:

@@ -20,8 +20,7 @@ def clips_of(wildcards):
 def per_clip(pattern, first=0):
     """Input function: `pattern` for every clip of the wildcards' take from `first` on."""
     return lambda wildcards: [
-        pattern.format(subject=wildcards.subject, take=wildcards.take, clip=f"{clip:04d}")
-        for clip in clips_of(wildcards)[first:]
+        fill(pattern, wildcards, clip=f"{clip:04d}") for clip in clips_of(wildcards)[first:]
     ]
 
 
@@ -35,14 +34,9 @@ def window_of(wildcards):
 def window_manifests(wildcards):
     """Manifests of the chunks that hold an anchor's window, and the neutral's."""
     wanted = {take_of(wildcards).first, *window_of(wildcards)}
-    pattern = R + "/takes/{subject}/{take}/capture/{chunk}.json"
-    files = expand_chunks(pattern, wildcards.subject, wildcards.take)
-    names = chunks(wildcards.subject, wildcards.take)
+    files = of_chunks(P.manifest, wildcards)
+    names = chunks(wildcards)
     return [path for path, name in zip(files, names) if wanted & set(frames_in(name))]
-
-
-ANCHORS = R + "/takes/{subject}/{take}/multiview/anchors/{clip}.npz"
-CLIPS = R + "/takes/{subject}/{take}/multiview/clips/{clip}.npz"
 
 
 def first_take(wildcards):
@@ -58,11 +52,10 @@ def first_neutral(wildcards):
     first = first_take(wildcards)
     if first is None:
         return {}
-    folder = f"{R}/takes/{first.subject}/{first.take}"
     return {
-        "first_neutral": f"{folder}/multiview/neutral.npz",
-        "first_cameras": f"{folder}/cameras",
-        "first_manifest": f"{folder}/capture/{chunks(first.subject, first.take)[0]}.json",
+        "first_neutral": fill(P.neutral, first),
+        "first_cameras": fill(P.cameras, first),
+        "first_manifest": of_chunks(P.manifest, first)[0],
     }
 
 
@@ -83,19 +76,19 @@ rule multiview_neutral:
     """Registers the template to the take's first frame: neutral.npz and its cloud (Lips16 3.1)."""
     input:
         unpack(first_neutral),
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        landmarks=R + "/takes/{subject}/{take}/landmarks/views_neutral.npz",
-        manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        template=P.template,
+        cameras=P.cameras,
+        landmarks=P.views_neutral,
+        manifest=first_chunk(P.manifest),
     output:
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        cloud=R + "/takes/{subject}/{take}/multiview/cloud_neutral.ply",
-        surface=R + "/takes/{subject}/{take}/multiview/surface_neutral.ply",
-        overlay=R + "/takes/{subject}/{take}/multiview/overlay/neutral.png",
+        neutral=P.neutral,
+        cloud=P.neutral_cloud,
+        surface=P.neutral_surface,
+        overlay=P.neutral_overlay,
     log:
-        R + "/logs/multiview_neutral/{subject}-{take}.log",
+        P.log("multiview_neutral", "take"),
     benchmark:
-        R + "/benchmarks/multiview_neutral/{subject}-{take}.tsv"
+        P.benchmark("multiview_neutral", "take")
     resources:
         mem_mb=1500,
         runtime=30,
@@ -103,7 +96,7 @@ rule multiview_neutral:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.neutral"),
         code=code_of("multiview/multiview_neutral"),
         source=source_of,
-        frame=lambda wildcards: take_of(wildcards).first,
+        frame=first_frame,
         first=first_place,
     script:
         "../scripts/multiview/multiview_neutral.py"
@@ -112,16 +105,16 @@ rule multiview_neutral:
 rule multiview_anchor:
     """Registers the frame of a window that looks most like the neutral to it: anchors/{clip}.npz."""
     input:
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
+        template=P.template,
+        cameras=P.cameras,
+        neutral=P.neutral,
         manifests=window_manifests,
     output:
-        anchor=ANCHORS,
+        anchor=P.anchor,
     log:
-        R + "/logs/multiview_anchor/{subject}-{take}-{clip}.log",
+        P.log("multiview_anchor", "clip"),
     benchmark:
-        R + "/benchmarks/multiview_anchor/{subject}-{take}-{clip}.tsv"
+        P.benchmark("multiview_anchor", "clip")
     resources:
         mem_mb=1500,
         runtime=30,
@@ -129,7 +122,7 @@ rule multiview_anchor:
         cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview/multiview_anchor"),
         source=source_of,
-        neutral=lambda wildcards: take_of(wildcards).first,
+        neutral=first_frame,
         window=window_of,
     script:
         "../scripts/multiview/multiview_anchor.py"
@@ -138,17 +131,17 @@ rule multiview_anchor:
 rule multiview_clip:
     """Tracks the frames between two anchors coarsely, forward and backward: clips/{clip}.npz."""
     input:
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        anchors=per_clip(ANCHORS, first=1),
-        manifests=per_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
+        template=P.template,
+        cameras=P.cameras,
+        neutral=P.neutral,
+        anchors=per_clip(P.anchor, first=1),
+        manifests=per_chunk(P.manifest),
     output:
-        clip=CLIPS,
+        clip=P.clip,
     log:
-        R + "/logs/multiview_clip/{subject}-{take}-{clip}.log",
+        P.log("multiview_clip", "clip"),
     benchmark:
-        R + "/benchmarks/multiview_clip/{subject}-{take}-{clip}.tsv"
+        P.benchmark("multiview_clip", "clip")
     resources:
         mem_mb=1500,
         runtime=60,
@@ -156,7 +149,7 @@ rule multiview_clip:
         cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview/multiview_clip"),
         source=source_of,
-        frames=lambda wildcards: [take_of(wildcards).first, take_of(wildcards).last],
+        frames=take_span,
     script:
         "../scripts/multiview/multiview_clip.py"
 
@@ -164,17 +157,17 @@ rule multiview_clip:
 rule multiview_track:
     """Joins the clips of a take: track.npz."""
     input:
-        template=R + "/face/template.npz",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        anchors=per_clip(ANCHORS, first=1),
-        clips=per_clip(CLIPS),
+        template=P.template,
+        neutral=P.neutral,
+        anchors=per_clip(P.anchor, first=1),
+        clips=per_clip(P.clip),
     output:
-        track=R + "/takes/{subject}/{take}/multiview/track.npz",
-        topology=R + "/takes/{subject}/{take}/multiview/H/topology.ply",
+        track=P.track,
+        topology=P.accurate_topology,
     log:
-        R + "/logs/multiview_track/{subject}-{take}.log",
+        P.log("multiview_track", "take"),
     benchmark:
-        R + "/benchmarks/multiview_track/{subject}-{take}.tsv"
+        P.benchmark("multiview_track", "take")
     resources:
         mem_mb=2000,
         runtime=10,
@@ -187,21 +180,21 @@ rule multiview_track:
 rule multiview_refine:
     """Registers each frame of a chunk to the neutral's images: H/{chunk}.npy (Lips16 3.1)."""
     input:
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        track=R + "/takes/{subject}/{take}/multiview/track.npz",
-        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
-        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
+        template=P.template,
+        cameras=P.cameras,
+        neutral=P.neutral,
+        track=P.track,
+        first_manifest=first_chunk(P.manifest),
+        manifest=P.manifest,
     output:
-        meshes=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",
-        visibility=R + "/takes/{subject}/{take}/multiview/visibility/{chunk}.npy",
-        quality=R + "/takes/{subject}/{take}/multiview/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/multiview/overlay/{chunk}.png",
+        meshes=P.accurate,
+        visibility=P.visibility,
+        quality=P.multiview_quality,
+        overlay=P.multiview_overlay,
     log:
-        R + "/logs/multiview_refine/{subject}-{take}-{chunk}.log",
+        P.log("multiview_refine", "chunk"),
     benchmark:
-        R + "/benchmarks/multiview_refine/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("multiview_refine", "chunk")
     resources:
         mem_mb=1500,
         runtime=60,
@@ -209,8 +202,8 @@ rule multiview_refine:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.refine"),
         code=code_of("multiview/multiview_refine"),
         source=source_of,
-        neutral=lambda wildcards: take_of(wildcards).first,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        neutral=first_frame,
+        frames=chunk_frames,
     script:
         "../scripts/multiview/multiview_refine.py"
 
@@ -218,18 +211,18 @@ rule multiview_refine:
 rule multiview_drift:
     """Compares each frame of a chunk with the neutral's images, carried by the mesh: drift/{chunk}.tsv."""
     input:
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        meshes=R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy",
-        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
-        manifest=R + "/takes/{subject}/{take}/capture/{chunk}.json",
+        template=P.template,
+        cameras=P.cameras,
+        neutral=P.neutral,
+        meshes=P.accurate,
+        first_manifest=first_chunk(P.manifest),
+        manifest=P.manifest,
     output:
-        drift=R + "/takes/{subject}/{take}/multiview/drift/{chunk}.tsv",
+        drift=P.drift,
     log:
-        R + "/logs/multiview_drift/{subject}-{take}-{chunk}.log",
+        P.log("multiview_drift", "chunk"),
     benchmark:
-        R + "/benchmarks/multiview_drift/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("multiview_drift", "chunk")
     resources:
         mem_mb=1500,
         runtime=30,
@@ -237,8 +230,8 @@ rule multiview_drift:
         cfg=cfg_of("multiview.images", "multiview.drift"),
         code=code_of("multiview/multiview_drift"),
         source=source_of,
-        neutral=lambda wildcards: take_of(wildcards).first,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        neutral=first_frame,
+        frames=chunk_frames,
     script:
         "../scripts/multiview/multiview_drift.py"
 
@@ -246,37 +239,35 @@ rule multiview_drift:
 def if_tracked(pattern):
     """Input function: `pattern`, for every chunk, of a take with H; nothing of a neutral alone."""
     return lambda wildcards: (
-        list(dict.fromkeys(per_chunk(pattern)(wildcards)))
-        if take_of(wildcards).role == "tattoo"
-        else []
+        of_takes(pattern, [wildcards]) if take_of(wildcards).role == "tattoo" else []
     )
 
 
 rule multiview_report:
     """Shows how well each frame of a take is known, and where to look: report.html, drift.tsv."""
     input:
-        template=R + "/face/template.npz",
-        cameras=R + "/takes/{subject}/{take}/cameras",
-        neutral=R + "/takes/{subject}/{take}/multiview/neutral.npz",
-        first_manifest=first_chunk(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
-        manifests=if_tracked(R + "/takes/{subject}/{take}/capture/{chunk}.json"),
-        track=if_tracked(R + "/takes/{subject}/{take}/multiview/track.npz"),
-        meshes=if_tracked(R + "/takes/{subject}/{take}/multiview/H/{chunk}.npy"),
-        visibility=if_tracked(R + "/takes/{subject}/{take}/multiview/visibility/{chunk}.npy"),
-        quality=if_tracked(R + "/takes/{subject}/{take}/multiview/quality/{chunk}.tsv"),
-        drift=if_tracked(R + "/takes/{subject}/{take}/multiview/drift/{chunk}.tsv"),
+        template=P.template,
+        cameras=P.cameras,
+        neutral=P.neutral,
+        first_manifest=first_chunk(P.manifest),
+        manifests=if_tracked(P.manifest),
+        track=if_tracked(P.track),
+        meshes=if_tracked(P.accurate),
+        visibility=if_tracked(P.visibility),
+        quality=if_tracked(P.multiview_quality),
+        drift=if_tracked(P.drift),
     output:
         page=report(
-            R + "/takes/{subject}/{take}/multiview/report.html",
+            P.multiview_page,
             category="Reconstruction",
             labels={"take": "{subject}/{take}"},
             caption="../report/reconstruction.rst",
         ),
-        drift=R + "/takes/{subject}/{take}/multiview/drift.tsv",
+        drift=P.drift_table,
     log:
-        R + "/logs/multiview_report/{subject}-{take}.log",
+        P.log("multiview_report", "take"),
     benchmark:
-        R + "/benchmarks/multiview_report/{subject}-{take}.tsv"
+        P.benchmark("multiview_report", "take")
     resources:
         mem_mb=2000,
         runtime=30,
@@ -290,6 +281,6 @@ rule multiview_report:
         ),
         code=code_of("multiview/multiview_report"),
         source=source_of,
-        neutral=lambda wildcards: take_of(wildcards).first,
+        neutral=first_frame,
     script:
         "../scripts/multiview/multiview_report.py"

@@ -4,79 +4,66 @@
 def used_takes(role=None):
     """Takes that the database, the evaluation or the application needs."""
     wanted = {take.name for take in database_takes() + evaluated_takes()}
-    wanted |= set(applied_takes())
+    wanted |= {take.name for take in applied_takes()}
     people = {name.split("/")[0] for name in wanted}
     wanted |= {take.name for take in takes("plain") if take.subject in people}
     return [take for take in takes(role) if take.name in wanted]
 
 
-#: Folder of a stage's quality rows and overlays within a take -> the roles that have it.
-STAGE_FOLDERS = {
-    "capture": ("tattoo", "plain", "video"),
-    "multiview": ("tattoo",),
-    "inpaint": ("tattoo",),
-    "landmarks": ("tattoo", "video"),
-    "tracking": ("tattoo", "video"),
-    "contours": ("tattoo", "video"),
-    "correction/features": ("tattoo", "video"),
-    "correction": ("tattoo",),
+#: Stage -> its quality rows and overlays of a chunk, and the roles of the takes that have them.
+STAGES = {
+    "capture": (P.capture_quality, P.capture_overlay, ("tattoo", "plain", "video")),
+    "multiview": (P.multiview_quality, P.multiview_overlay, ("tattoo",)),
+    "inpaint": (P.inpaint_quality, P.inpaint_overlay, ("tattoo",)),
+    "landmarks": (
+        P.landmarks_folder + "/quality/{chunk}.tsv",
+        P.landmarks_folder + "/overlay/{chunk}.png",
+        TRACKED_ROLES,
+    ),
+    "tracking": (P.tracking_quality, P.tracking_overlay, TRACKED_ROLES),
+    "contours": (P.contours_quality, P.contours_overlay, TRACKED_ROLES),
+    "features": (P.features_quality, P.features_overlay, TRACKED_ROLES),
+    "correction": (P.correction_quality, P.correction_overlay, ("tattoo",)),
 }
 
 
 def quality_files():
     """Quality tables of every stage that ran."""
-    paths = [
-        path
-        for folder, roles in STAGE_FOLDERS.items()
-        for take in used_takes(roles)
-        for path in expand_chunks(
-            R + "/takes/{subject}/{take}/" + folder + "/quality/{chunk}.tsv",
-            take.subject,
-            take.take,
-        )
+    return [
+        *[
+            path
+            for quality, _, roles in STAGES.values()
+            for path in of_takes(quality, used_takes(roles))
+        ],
+        *of_takes(P.label_quality, used_takes(TRACKED_ROLES)),
+        *expand(P.correspondence_quality, subject=subjects("tattoo")),
+        *expand(P.scan_quality, subject=CONFIG.tracking.scans),
+        *of_takes(P.evaluated + "/quality.tsv", evaluated_takes()),
+        *of_takes(P.flow_quality, detail_takes()),
+        *of_takes(P.relief_quality, relief_takes()),
+        *of_takes(P.apply_quality, applied_takes()),
     ]
-    labels = R + "/takes/{subject}/{take}/contours/quality/labels.tsv"
-    paths += of_takes(labels, used_takes(STAGE_FOLDERS["contours"]))
-    people = subjects("tattoo")
-    paths += [f"{R}/subjects/{name}/correspondence/quality/neutral.tsv" for name in people]
-    paths += [f"{R}/subjects/{name}/scan/quality/scan.tsv" for name in CONFIG.tracking.scans]
-    paths += of_takes(EVALUATED + "/quality.tsv", evaluated_takes())
-    for take in detail_takes():
-        pattern = R + "/takes/{subject}/{take}/detail/quality/{chunk}.tsv"
-        paths += expand_chunks(pattern, take.subject, take.take)
-    for take in shading_takes():
-        paths += expand_chunks(SHADING + "/quality/{chunk}.tsv", take.subject, take.take)
-    for name in applied_takes():
-        paths += expand_chunks(APPLIED + "/quality/{chunk}.tsv", *name.split("/"))
-    return paths
 
 
 def stage_overlays():
     """[stage, what, file] of the images that the page shows: the first chunk of every take."""
-    rows = [["correspondence", s, f"{R}/subjects/{s}/correspondence/overlay/neutral.png"]
-            for s in subjects("tattoo")]  # fmt: skip
-    rows += [["scan", s, f"{R}/subjects/{s}/scan/overlay/scan.png"] for s in CONFIG.tracking.scans]
-    for folder, roles in STAGE_FOLDERS.items():
-        for take in used_takes(roles):
-            pattern = R + "/takes/{subject}/{take}/" + folder + "/overlay/{chunk}.png"
-            path = expand_chunks(pattern, take.subject, take.take)[0]
-            rows.append([folder.split("/")[-1], take.name, path])
-    for take in used_takes(("tattoo", "video")) if refinement_steps() else []:
-        folder = f"{R}/takes/{take.name}/tracking"
-        chunk = chunks(take.subject, take.take)[0]
-        rows.append(["refinement", f"{take.name}, appearance", f"{folder}/appearance.png"])
-        rows.append(["refinement", take.name, f"{folder}/residuals/overlay/{chunk}.png"])
-    for take in detail_takes():
-        pattern = R + "/takes/{subject}/{take}/detail/overlay/{chunk}.png"
-        rows.append(["detail", take.name, expand_chunks(pattern, take.subject, take.take)[0]])
-    for take in shading_takes():
-        pattern = SHADING + "/overlay/{chunk}.png"
-        path = expand_chunks(pattern, take.subject, take.take)[0]
-        rows.append(["detail", f"{take.name}, relief", path])
-    for take in used_takes(("tattoo", "plain")):
-        path = f"{R}/takes/{take.name}/multiview/overlay/neutral.png"
-        rows.append(["multiview", f"{take.name}, neutral", path])
-    return rows
+    people = subjects("tattoo")
+    rows = [["correspondence", s, P.correspondence_overlay.format(subject=s)] for s in people]
+    rows += [["scan", s, P.scan_overlay.format(subject=s)] for s in CONFIG.tracking.scans]
+    shown = [
+        (stage, "", overlay, used_takes(roles)) for stage, (_, overlay, roles) in STAGES.items()
+    ]
+    if image_steps():
+        shown.append(("tracking", ", appearance", P.appearance_overlay, used_takes(TRACKED_ROLES)))
+        shown.append(("tracking", ", residuals", P.residuals_overlay, used_takes(TRACKED_ROLES)))
+    shown.append(("detail", "", P.flow_overlay, detail_takes()))
+    shown.append(("detail", ", relief", P.relief_overlay, relief_takes()))
+    shown.append(("multiview", ", neutral", P.neutral_overlay, used_takes(("tattoo", "plain"))))
+    return rows + [
+        [stage, take.name + what, of_chunks(pattern, take)[0]]
+        for stage, what, pattern, rows_of_stage in shown
+        for take in rows_of_stage
+    ]
 
 
 def measured_against(take):
@@ -114,15 +101,15 @@ rule quality:
         tables=quality_files(),
     output:
         flagged=report(
-            R + "/quality.tsv",
+            P.quality,
             category="Tables",
             labels={"table": "flagged frames"},
             caption="../report/quality.rst",
         ),
     log:
-        R + "/logs/quality.log",
+        P.log("quality", "run"),
     benchmark:
-        R + "/benchmarks/quality.tsv"
+        P.benchmark("quality", "run")
     resources:
         mem_mb=1000,
         runtime=20,
@@ -135,38 +122,36 @@ rule quality:
 rule summary:
     """Puts tables, figures, flagged frames, overlays and the method on one page: summary.html."""
     input:
-        measures=R + "/evaluation/measures.tsv",
-        table1=R + "/evaluation/table1.tsv",
-        kinds=R + "/evaluation/kinds.tsv",
-        comparisons=R + "/evaluation/comparisons.tsv",
-        table2=R + "/evaluation/table2.tsv",
-        table3=R + "/evaluation/table3.tsv",
-        estimators=R + "/evaluation/estimators.tsv",
-        image=R + "/evaluation/table1.png",
-        figure16=R + "/evaluation/figure16.png",
-        quality=R + "/quality.tsv",
-        maps=of_takes(EVALUATED + "/error_maps.png", evaluated_takes()),
-        renders=of_takes(EVALUATED + "/renders.png", evaluated_takes()),
-        stretch=of_takes(EVALUATED + "/stretch.png", evaluated_takes()),
-        curves=of_takes(EVALUATED + "/curves.png", evaluated_takes()),
-        reconstructions=of_takes(
-            R + "/takes/{subject}/{take}/multiview/report.html", used_takes("tattoo")
-        ),
-        training=[f"{R}/models/{name}.cv.png" for name in regressor_names()],
+        measures=P.measures,
+        table1=P.table1,
+        kinds=P.kinds,
+        comparisons=P.comparisons,
+        table2=P.table2,
+        table3=P.table3,
+        estimators=P.estimators,
+        image=P.table1_figure,
+        figure16=P.figure16,
+        quality=P.quality,
+        maps=of_takes(P.evaluated + "/error_maps.png", evaluated_takes()),
+        renders=of_takes(P.evaluated + "/renders.png", evaluated_takes()),
+        stretch=of_takes(P.evaluated + "/stretch.png", evaluated_takes()),
+        curves=of_takes(P.evaluated + "/curves.png", evaluated_takes()),
+        reconstructions=of_takes(P.multiview_page, used_takes("tattoo")),
+        training=expand(P.validation_curve, regressor=regressor_names()),
         overlays=[path for _, _, path in stage_overlays()],
-        videos=[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
-        timelines=[f"{R}/apply/{name}/timeline.png" for name in applied_takes()],
+        videos=of_takes(P.apply_overlay, applied_takes()),
+        timelines=of_takes(P.timeline, applied_takes()),
     output:
         page=report(
-            R + "/evaluation/summary.html",
+            P.summary,
             category="Summary",
             labels={"page": "summary"},
             caption="../report/summary.rst",
         ),
     log:
-        R + "/logs/summary.log",
+        P.log("summary", "run"),
     benchmark:
-        R + "/benchmarks/summary.tsv"
+        P.benchmark("summary", "run")
     resources:
         mem_mb=2000,
         runtime=20,
@@ -189,7 +174,7 @@ rule summary:
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),
             "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
-            "videos": applied_takes(),
+            "videos": [take.name for take in applied_takes()],
             "reconstructions": [take.name for take in used_takes("tattoo")],
         },
         regressors=regressor_rows(),

@@ -14,19 +14,19 @@ def scan_of(wildcards):
 rule scan:
     """Lays the tracker's model over a scan and transfers all its expressions."""
     input:
-        tracker=R + "/face/tracker.npz",
+        tracker=P.tracker,
         scan=lambda wildcards: scan_of(wildcards).path,
         landmarks=lambda wildcards: scan_of(wildcards).landmarks or [],
         detector=lambda wildcards: [] if scan_of(wildcards).landmarks else detector_files(wildcards),
     output:
-        tracker=R + "/subjects/{subject}/tracker.npz",
-        landmarks=R + "/subjects/{subject}/scan/landmarks.tsv",
-        quality=R + "/subjects/{subject}/scan/quality/scan.tsv",
-        overlay=R + "/subjects/{subject}/scan/overlay/scan.png",
+        tracker=P.own_tracker,
+        landmarks=P.scan_landmarks,
+        quality=P.scan_quality,
+        overlay=P.scan_overlay,
     log:
-        R + "/logs/scan/{subject}.log",
+        P.log("scan", "subject"),
     benchmark:
-        R + "/benchmarks/scan/{subject}.tsv"
+        P.benchmark("scan", "subject")
     resources:
         mem_mb=3000,
         runtime=30,

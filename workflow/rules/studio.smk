@@ -87,7 +87,7 @@ def studio_landmark_labels(take):
 
 def studio_label_files(take):
     """Label files of a take, in the order of the two lists above."""
-    labels = f"{R}/captures/{take.name}/labels"
+    labels = fill(P.capture_folder, take) + "/labels"
     return [
         f"{labels}/{kind}/{camera}/{frame:06d}.json"
         for kind, pairs in (
@@ -98,9 +98,9 @@ def studio_label_files(take):
     ]
 
 
-def studio_cameras(subject, take):
+def studio_cameras(take):
     """Camera files of a studio take."""
-    folder = f"{R}/captures/{subject}/{take}/cameras"
+    folder = fill(P.capture_folder, take) + "/cameras"
     return [f"{folder}/{name}.txt" for name in ("cameras", "images", "points3D")]
 
 
@@ -108,18 +108,18 @@ def studio_outputs():
     """Every image, camera and label of the studio's takes; the truth comes with them."""
     paths = []
     for take in [take for take in TAKES if take.source == STUDIO]:
-        for chunk in chunks(take.subject, take.take):
-            paths += studio_frames(take.subject, take.take, chunk)
-        paths += studio_cameras(take.subject, take.take) + studio_label_files(take)
+        for chunk in chunks(take):
+            paths += studio_frames(take, chunk)
+        paths += studio_cameras(take) + studio_label_files(take)
     return paths
 
 
-def studio_frames(subject, take, chunk):
+def studio_frames(take, chunk):
     """Images of a chunk of a studio take."""
-    role = _TAKES[f"{subject}/{take}"].role
+    folder = fill(P.capture_folder, take) + "/frames"
     return [
-        f"{R}/captures/{subject}/{take}/frames/{camera}/{frame:06d}.png"
-        for camera in camera_names(role)
+        f"{folder}/{camera}/{frame:06d}.png"
+        for camera in camera_names(take_of(take).role)
         for frame in frames_in(chunk)
     ]
 
@@ -131,22 +131,22 @@ for take in [take for take in TAKES if take.source == STUDIO]:
         name:
             f"studio_rig_{take.subject}_{take.take}"
         input:
-            model=f"{R}/face/studio.npz",
+            model=P.studio_model,
             csv=studio_csv(take),
         output:
-            cameras=studio_cameras(take.subject, take.take),
+            cameras=studio_cameras(take),
             labels=studio_label_files(take),
             truth=multiext(
-                f"{R}/truth/{take.name}/",
+                fill(P.truth, take) + "/",
                 "vertices_mm.npy",
                 "triangles.npy",
                 "neutral_mm.npy",
                 "weights.json",
             ),
         log:
-            f"{R}/logs/studio/{take.subject}-{take.take}-rig.log",
+            fill(P.log("studio_rig", "take"), take),
         benchmark:
-            f"{R}/benchmarks/studio/{take.subject}-{take.take}-rig.tsv"
+            fill(P.benchmark("studio_rig", "take"), take)
         resources:
             mem_mb=1500 + len(take.frames),
             runtime=30,
@@ -161,22 +161,22 @@ for take in [take for take in TAKES if take.source == STUDIO]:
         script:
             "../scripts/studio/studio_rig.py"
 
-    for chunk in chunks(take.subject, take.take):
+    for chunk in chunks(take):
 
         rule:
             # The images of one chunk of a take, from all cameras.
             name:
                 f"studio_take_{take.subject}_{take.take}_{chunk.replace('-', '_')}"
             input:
-                model=f"{R}/face/studio.npz",
+                model=P.studio_model,
                 csv=studio_csv(take),
-                cameras=studio_cameras(take.subject, take.take),
+                cameras=studio_cameras(take),
             output:
-                studio_frames(take.subject, take.take, chunk),
+                studio_frames(take, chunk),
             log:
-                f"{R}/logs/studio/{take.subject}-{take.take}-{chunk}.log",
+                fill(P.log("studio_take", "chunk"), take, chunk=chunk),
             benchmark:
-                f"{R}/benchmarks/studio/{take.subject}-{take.take}-{chunk}.tsv"
+                fill(P.benchmark("studio_take", "chunk"), take, chunk=chunk)
             resources:
                 mem_mb=1500,
                 runtime=5 + len(frames_in(chunk)),

@@ -4,30 +4,19 @@ Snakemake does not miss an intermediate file as long as what follows from it exi
 therefore wanted through its first output; `verify` removes all outputs of a job together.
 """
 
-#: Role -> outputs a take: those with {chunk} are wanted for every chunk.
+#: Roles -> outputs of a take: those with {chunk} are wanted for every chunk.
 TAKE_OUTPUTS = {
-    ("tattoo", "plain", "video"): ("capture/{chunk}.json", "cameras"),
-    ("tattoo", "plain"): (
-        "landmarks/views_neutral.npz",
-        "multiview/neutral.npz",
-        "multiview/report.html",
-    ),
-    ("tattoo",): (
-        "multiview/track.npz",
-        "multiview/H/{chunk}.npy",
-        "multiview/drift/{chunk}.tsv",
-        "inpaint/reference.exr",
-        "inpaint/{chunk}",
-        "correction/layers/{chunk}.npz",
-    ),
-    ("tattoo", "video"): (
-        "landmarks/{chunk}.npz",
-        "tracking/fit.npz",
-        "tracking/C/topology.ply",
-        "tracking/C/{chunk}.npy",
-        "contours/detector.npz",
-        "contours/{chunk}",
-        "correction/features/{chunk}.npz",
+    ("tattoo", "plain", "video"): (P.manifest, P.cameras),
+    ("tattoo", "plain"): (P.views_neutral, P.neutral, P.multiview_page),
+    ("tattoo",): (P.track, P.accurate, P.drift, P.tattoo_reference, P.inpainted, P.layers),
+    TRACKED_ROLES: (
+        P.landmarks,
+        P.fit,
+        P.coarse_topology,
+        P.coarse,
+        P.contour_detector,
+        P.maps,
+        P.features,
     ),
 }
 
@@ -36,12 +25,9 @@ def take_outputs():
     """Files and folders of the stages of every take that is used."""
     return [
         path
-        for roles, names in TAKE_OUTPUTS.items()
-        for take in used_takes(roles)
-        for name in names
-        for path in dict.fromkeys(
-            expand_chunks(R + "/takes/{subject}/{take}/" + name, take.subject, take.take)
-        )
+        for roles, patterns in TAKE_OUTPUTS.items()
+        for pattern in patterns
+        for path in of_takes(pattern, used_takes(roles))
     ]
 
 
@@ -50,64 +36,53 @@ def clip_outputs():
     return [
         path
         for take in used_takes("tattoo")
-        for pattern, first in ((ANCHORS, 1), (CLIPS, 0))
+        for pattern, first in ((P.anchor, 1), (P.clip, 0))
         for path in per_clip(pattern, first)(take)
     ]
 
 
 def subject_outputs():
     """Files of every subject of the database, and identities of all that are tracked."""
-    tracked = dict.fromkeys(take.subject for take in used_takes(("tattoo", "video")))
-    paths = [f"{R}/subjects/{subject}/identity.npz" for subject in tracked]
-    paths += [
-        f"{R}/subjects/{subject}/overlay/identity.png"
-        for subject in tracked
-        if subject in imaged_subjects()
+    tracked = list(dict.fromkeys(take.subject for take in used_takes(TRACKED_ROLES)))
+    imaged = [subject for subject in tracked if subject in imaged_subjects()]
+    return [
+        *expand(P.identity, subject=tracked),
+        *expand(P.identity_overlay, subject=imaged),
+        *expand(P.plain_texture, subject=subjects("tattoo")),
+        *expand(P.correspondence, subject=subjects("tattoo")),
+        *of_takes(P.neutral_pair, neutral_takes()),
     ]
-    for subject in subjects("tattoo"):
-        paths.append(f"{R}/subjects/{subject}/plain_texture.exr")
-        paths.append(f"{R}/subjects/{subject}/correspondence.npz")
-    return paths + of_takes(NEUTRAL_PAIR, neutral_takes())
 
 
 def evaluation_outputs():
     """Measures and figures of every take that is measured."""
     rows = evaluated_takes()
     return (
-        of_takes(EVALUATED + "/measures.tsv", rows)
-        + of_takes(EVALUATED + "/error_maps.png", rows)
-        + of_takes(RECONSTRUCTED + "/measures.tsv", reconstructed_takes())
+        of_takes(P.evaluated + "/measures.tsv", rows)
+        + of_takes(P.evaluated + "/error_maps.png", rows)
+        + of_takes(P.reconstructed + "/measures.tsv", reconstructed_takes())
     )
 
 
 def all_outputs():
     """All that a finished run has."""
-    landmark_model = [LANDMARK_MODEL] if CONFIG.landmarks.detector == "trained" else []
+    landmark_model = [P.landmark_model] if CONFIG.landmarks.detector == "trained" else []
     return [
         *studio_outputs(),
-        f"{R}/face/tracker.npz",
+        P.tracker,
         *landmark_model,
         *take_outputs(),
         *clip_outputs(),
         *subject_outputs(),
         *detail_outputs(),
-        *shading_outputs(),
-        R + "/database/lips.h5",
+        P.database,
         *regressor_outputs(),
         *evaluation_outputs(),
-        R + "/evaluation/measures.tsv",
-        *[f"{R}/apply/{name}/overlay.mp4" for name in applied_takes()],
-        *[
-            path
-            for name in applied_takes()
-            for path in expand_chunks(APPLIED + "/chunks/{chunk}.npy", *name.split("/"))
-        ],
-        *[
-            f"{R}/apply/{name}/makeup.mp4"
-            for name in applied_takes()
-            if CONFIG.apply.makeup.enabled
-        ],
-        *([R + "/evaluation/ablations.tsv"] if ablation_tables() else []),
-        R + "/quality.tsv",
-        R + "/evaluation/summary.html",
+        P.measures,
+        *of_takes(P.apply_overlay, applied_takes()),
+        *of_takes(P.corrected, applied_takes()),
+        *(of_takes(P.makeup, applied_takes()) if CONFIG.apply.makeup.enabled else []),
+        *([P.ablations] if ablation_tables() else []),
+        P.quality,
+        P.summary,
     ]

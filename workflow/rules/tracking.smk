@@ -1,4 +1,9 @@
-"""The coarse sequence C (Lips16 3.2, Mono13 6): who it is, then pose and blend weights."""
+"""The coarse sequence C (Lips16 3.2, Mono13 6): the person, then pose and blend weights.
+
+First from landmarks (landmark_fit.npz), then from the images by analysis by synthesis: appearance of
+a take (lighting, albedo), pose and expression of each frame, joined over time (fit.npz), offsets
+outside the model's space; and how much of the image each step explains.
+"""
 
 TRACKED_ROLES = ("tattoo", "video")
 
@@ -22,17 +27,7 @@ def identity_takes(wildcards):
 
 def of_identity_takes(pattern):
     """Input function: `pattern` for every take of a subject, and every chunk where it has them."""
-
-    def inputs(wildcards):
-        paths = []
-        for take in identity_takes(wildcards):
-            if "{chunk}" in pattern:
-                paths += expand_chunks(pattern, take.subject, take.take)
-            else:
-                paths.append(pattern.format(subject=take.subject, take=take.take))
-        return paths
-
-    return inputs
+    return lambda wildcards: of_takes(pattern, identity_takes(wildcards))
 
 
 def sampled_takes(wildcards):
@@ -42,7 +37,7 @@ def sampled_takes(wildcards):
             "take": t.take,
             "camera": mono_camera(t),
             "neutral": t.first if t.is_multiview else None,
-            "chunks": len(chunks(t.subject, t.take)),
+            "chunks": len(chunks(t)),
         }
         for t in identity_takes(wildcards)
     ]
@@ -65,15 +60,15 @@ rule identity:
     """Finds the person in landmarks of frames of all takes: subjects/{subject}/identity.npz."""
     input:
         tracker=tracker_of,
-        landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
-        cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
-        calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
+        landmarks=of_identity_takes(P.landmarks),
+        cameras=of_identity_takes(P.cameras),
+        calibration=of_identity_takes(P.calibration),
     output:
-        identity=R + "/subjects/{subject}/identity.npz",
+        identity=P.identity,
     log:
-        R + "/logs/identity/{subject}.log",
+        P.log("identity", "subject"),
     benchmark:
-        R + "/benchmarks/identity/{subject}.tsv"
+        P.benchmark("identity", "subject")
     resources:
         mem_mb=1500,
         runtime=30,
@@ -89,19 +84,19 @@ rule image_identity:
     """Finds the person in landmarks and images together: subjects/{subject}/identity.npz."""
     input:
         tracker=tracker_of,
-        landmarks=of_identity_takes(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
-        cameras=of_identity_takes(R + "/takes/{subject}/{take}/cameras"),
-        calibration=of_identity_takes(R + "/takes/{subject}/{take}/capture/cameras.json"),
+        landmarks=of_identity_takes(P.landmarks),
+        cameras=of_identity_takes(P.cameras),
+        calibration=of_identity_takes(P.calibration),
         images=lambda wildcards: [
             path for take in identity_takes(wildcards) for path in mono_images(take)
         ],
     output:
-        identity=R + "/subjects/{subject}/identity.npz",
-        overlay=R + "/subjects/{subject}/overlay/identity.png",
+        identity=P.identity,
+        overlay=P.identity_overlay,
     log:
-        R + "/logs/image_identity/{subject}.log",
+        P.log("image_identity", "subject"),
     benchmark:
-        R + "/benchmarks/image_identity/{subject}.tsv"
+        P.benchmark("image_identity", "subject")
     wildcard_constraints:
         subject=from_images(),
     resources:
@@ -111,7 +106,7 @@ rule image_identity:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
         code=code_of("tracking/image_identity"),
         takes=lambda wildcards: [
-            row | {"source": mono_sources(take)}
+            row | {"source": mono_source(take)}
             for row, take in zip(sampled_takes(wildcards), identity_takes(wildcards))
         ],
     script:
@@ -121,32 +116,29 @@ rule image_identity:
 ruleorder: image_identity > identity
 
 
-def landmark_fit(wildcards=None):
-    """Where the fit to the landmarks lies: beside the refined one, or in its place."""
-    name = "landmark_fit" if CONFIG.refinement.photometric else "fit"
-    return R + f"/takes/{{subject}}/{{take}}/tracking/{name}.npz"
+def landmark_fit():
+    """Where the fit to the landmarks lies: beside the fit to the images, or in its place."""
+    return P.landmark_fit if CONFIG.tracking.image_fit.enabled else P.fit
 
 
 def mesh_offsets(wildcards):
     """Input of the meshes: offsets of a chunk that a refinement adds to the model's vertices."""
-    if not CONFIG.refinement.layer:
-        return {}
-    return {"offsets": R + "/takes/{subject}/{take}/tracking/offsets/{chunk}.npy"}
+    return {"offsets": P.offsets} if CONFIG.tracking.offsets.enabled else {}
 
 
 rule tracking:
     """Fits pose and blend weights of a whole take to its landmarks."""
     input:
         tracker=tracker_of,
-        identity=R + "/subjects/{subject}/identity.npz",
-        landmarks=per_chunk(R + "/takes/{subject}/{take}/landmarks/{chunk}.npz"),
-        cameras=R + "/takes/{subject}/{take}/cameras",
+        identity=P.identity,
+        landmarks=per_chunk(P.landmarks),
+        cameras=P.cameras,
     output:
         fit=landmark_fit(),
     log:
-        R + "/logs/tracking/{subject}-{take}.log",
+        P.log("tracking", "take"),
     benchmark:
-        R + "/benchmarks/tracking/{subject}-{take}.tsv"
+        P.benchmark("tracking", "take")
     resources:
         mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
         runtime=60,
@@ -154,36 +146,239 @@ rule tracking:
         cfg=cfg_of("tracking.fit", "tracking.motion"),
         code=code_of("tracking/tracking"),
         camera=mono_camera,
-        fps=lambda wildcards: take_of(wildcards).fps,
+        fps=take_fps,
     script:
         "../scripts/tracking/tracking.py"
+
+
+def image_steps():
+    """Steps whose residuals are measured, in order: names of folders under tracking/residuals/."""
+    options = CONFIG.tracking
+    switches = {"image_fit": options.image_fit.enabled, "offsets": options.offsets.enabled}
+    steps = [name for name, on in switches.items() if on]
+    return ["landmarks", *steps] if steps else []
+
+
+def ablation_tables(wildcards=None):
+    """Residuals of every step, chunk and take that is used, and of the finer sequences."""
+    return detail_residuals() + residuals_of(used_takes(TRACKED_ROLES), image_steps())
+
+
+def residuals_of(rows, steps):
+    """Tables of residuals of some takes, every chunk after every step."""
+    return [
+        path
+        for take in rows
+        for step in steps
+        for path in of_chunks(P.residuals.replace("{step}", step), take)
+    ]
+
+
+rule appearance:
+    """Estimates the lighting and the albedo of a take: tracking/appearance.npz."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        identity=P.identity,
+        fit=landmark_fit(),
+        landmarks=per_chunk(P.landmarks),
+    output:
+        appearance=P.appearance,
+        overlay=P.appearance_overlay,
+    log:
+        P.log("appearance", "take"),
+    benchmark:
+        P.benchmark("appearance", "take")
+    resources:
+        mem_mb=1500,
+        runtime=30,
+    params:
+        cfg=cfg_of(
+            "tracking.fit",
+            "tracking.motion",
+            "tracking.image_fit.appearance",
+            "tracking.image_fit.frame_fit",
+        ),
+        code=code_of("tracking/appearance"),
+        source=mono_source,
+    script:
+        "../scripts/tracking/appearance.py"
+
+
+rule image_fit:
+    """Fits pose and expression of each frame of a chunk to its image: tracking/image_fit/{chunk}.npz."""
+    input:
+        images=chunk_images,
+        tracker=tracker_of,
+        identity=P.identity,
+        fit=landmark_fit(),
+        appearance=P.appearance,
+        landmarks=P.landmarks,
+    output:
+        P.image_fit,
+    log:
+        P.log("image_fit", "chunk"),
+    benchmark:
+        P.benchmark("image_fit", "chunk")
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of(
+            "tracking.fit",
+            "tracking.motion",
+            "tracking.image_fit.appearance",
+            "tracking.image_fit.frame_fit",
+        ),
+        code=code_of("tracking/image_fit"),
+        source=chunk_source,
+        frames=chunk_frames,
+    script:
+        "../scripts/tracking/image_fit.py"
+
+
+if CONFIG.tracking.image_fit.enabled:
+
+    rule image_fit_join:
+        """Joins the fitted frames of a take, smooth over time: tracking/fit.npz."""
+        input:
+            tracker=tracker_of,
+            identity=P.identity,
+            fit=landmark_fit(),
+            chunks=per_chunk(P.image_fit),
+            landmarks=per_chunk(P.landmarks),
+        output:
+            fit=P.fit,
+        log:
+            P.log("image_fit_join", "take"),
+        benchmark:
+            P.benchmark("image_fit_join", "take")
+        resources:
+            mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
+            runtime=60,
+        params:
+            cfg=cfg_of("tracking.fit", "tracking.motion", "tracking.image_fit.join"),
+            code=code_of("tracking/image_fit_join"),
+            fps=take_fps,
+        script:
+            "../scripts/tracking/image_fit_join.py"
+
+
+rule offsets:
+    """Offsets of the vertices outside the model's space: tracking/offsets/{chunk}.npy."""
+    input:
+        images=chunk_images,
+        tracker=tracker_of,
+        identity=P.identity,
+        fit=P.fit,
+        appearance=P.appearance,
+        landmarks=P.landmarks,
+    output:
+        P.offsets,
+    log:
+        P.log("offsets", "chunk"),
+    benchmark:
+        P.benchmark("offsets", "chunk")
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of(
+            "tracking.fit", "tracking.motion", "tracking.image_fit.appearance", "tracking.offsets"
+        ),
+        code=code_of("tracking/offsets"),
+        source=chunk_source,
+        frames=chunk_frames,
+    script:
+        "../scripts/tracking/offsets.py"
+
+
+rule residuals:
+    """How much of the images of a chunk each step leaves unexplained: residuals/<step>/."""
+    input:
+        unpack(mesh_offsets),
+        images=chunk_images,
+        tracker=tracker_of,
+        identity=P.identity,
+        landmark_fit=landmark_fit(),
+        fit=P.fit,
+        appearance=P.appearance,
+        landmarks=P.landmarks,
+    output:
+        tables=[P.residuals.replace("{step}", step) for step in image_steps() or ["landmarks"]],
+        overlay=P.residuals_overlay,
+    log:
+        P.log("residuals", "chunk"),
+    benchmark:
+        P.benchmark("residuals", "chunk")
+    resources:
+        mem_mb=1500,
+        runtime=60,
+    params:
+        cfg=cfg_of(
+            "tracking.fit",
+            "tracking.motion",
+            "tracking.image_fit.appearance",
+            "tracking.image_fit.overlay_frames",
+        ),
+        code=code_of("tracking/residuals"),
+        source=chunk_source,
+        frames=chunk_frames,
+        steps=image_steps() or ["landmarks"],
+    script:
+        "../scripts/tracking/residuals.py"
+
+
+rule ablations:
+    """Joins the residuals of all takes, a row a take and step: evaluation/ablations.tsv."""
+    input:
+        tables=ablation_tables,
+    output:
+        table=report(
+            P.ablations,
+            category="Tables",
+            labels={"table": "refinements of the track"},
+            caption="../report/ablations.rst",
+        ),
+    log:
+        P.log("ablations", "run"),
+    benchmark:
+        P.benchmark("ablations", "run")
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime=10,
+    params:
+        code=code_of("tracking/ablations"),
+    script:
+        "../scripts/tracking/ablations.py"
 
 
 rule tracking_meshes:
     """Writes C of a chunk in the world, and the model over the images: tracking/C/{chunk}.npy."""
     input:
-        unpack(mono_inputs),
         unpack(mesh_offsets),
+        images=chunk_images,
         tracker=tracker_of,
-        identity=R + "/subjects/{subject}/identity.npz",
-        fit=R + "/takes/{subject}/{take}/tracking/fit.npz",
-        landmarks=R + "/takes/{subject}/{take}/landmarks/{chunk}.npz",
+        identity=P.identity,
+        fit=P.fit,
+        landmarks=P.landmarks,
     output:
-        meshes=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
-        quality=R + "/takes/{subject}/{take}/tracking/quality/{chunk}.tsv",
-        overlay=R + "/takes/{subject}/{take}/tracking/overlay/{chunk}.png",
+        meshes=P.coarse,
+        quality=P.tracking_quality,
+        overlay=P.tracking_overlay,
     log:
-        R + "/logs/tracking_meshes/{subject}-{take}-{chunk}.log",
+        P.log("tracking_meshes", "chunk"),
     benchmark:
-        R + "/benchmarks/tracking_meshes/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("tracking_meshes", "chunk")
     resources:
         mem_mb=1500,
         runtime=60,
     params:
         cfg=cfg_of("tracking.meshes"),
         code=code_of("tracking/tracking_meshes"),
-        source=mono_source,
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        source=chunk_source,
+        frames=chunk_frames,
     script:
         "../scripts/tracking/tracking_meshes.py"
 
@@ -192,13 +387,13 @@ rule tracking_topology:
     """Writes the triangles of C beside its chunks: tracking/C/topology.ply."""
     input:
         tracker=tracker_of,
-        identity=R + "/subjects/{subject}/identity.npz",
+        identity=P.identity,
     output:
-        R + "/takes/{subject}/{take}/tracking/C/topology.ply",
+        P.coarse_topology,
     log:
-        R + "/logs/tracking_topology/{subject}-{take}.log",
+        P.log("tracking_topology", "take"),
     benchmark:
-        R + "/benchmarks/tracking_topology/{subject}-{take}.tsv"
+        P.benchmark("tracking_topology", "take")
     localrule: True
     resources:
         mem_mb=500,
@@ -214,11 +409,11 @@ rule tracked_meshes:
     input:
         source=source_of,
     output:
-        meshes=R + "/takes/{subject}/{take}/tracking/C/{chunk}.npy",
+        meshes=P.coarse,
     log:
-        R + "/logs/tracked_meshes/{subject}-{take}-{chunk}.log",
+        P.log("tracked_meshes", "chunk"),
     benchmark:
-        R + "/benchmarks/tracked_meshes/{subject}-{take}-{chunk}.tsv"
+        P.benchmark("tracked_meshes", "chunk")
     wildcard_constraints:
         take=external_takes(),
     resources:
@@ -227,7 +422,7 @@ rule tracked_meshes:
     params:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_meshes"),
-        frames=lambda wildcards: frames_in(wildcards.chunk),
+        frames=chunk_frames,
     script:
         "../scripts/tracking/tracked_meshes.py"
 
@@ -237,11 +432,11 @@ rule tracked_topology:
     input:
         source=source_of,
     output:
-        R + "/takes/{subject}/{take}/tracking/C/topology.ply",
+        P.coarse_topology,
     log:
-        R + "/logs/tracked_topology/{subject}-{take}.log",
+        P.log("tracked_topology", "take"),
     benchmark:
-        R + "/benchmarks/tracked_topology/{subject}-{take}.tsv"
+        P.benchmark("tracked_topology", "take")
     wildcard_constraints:
         take=external_takes(),
     localrule: True
@@ -251,7 +446,7 @@ rule tracked_topology:
     params:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_topology"),
-        first=lambda wildcards: take_of(wildcards).first,
+        first=first_frame,
     script:
         "../scripts/tracking/tracked_topology.py"
 

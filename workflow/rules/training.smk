@@ -13,21 +13,21 @@ def regressor_names():
 
 def regressor_outputs():
     """The files of all regressors of Lips16 section 6."""
-    return [f"{R}/models/{name}.h5" for name in regressor_names()]
+    return expand(P.model, regressor=regressor_names())
 
 
 rule train:
     """Trains a regressor on one subject (PS), all (MS) or all but one (GR)."""
     input:
-        database=R + "/database/lips.h5",
+        database=P.database,
     output:
-        model=R + "/models/{regressor}.h5",
-        curve=R + "/models/{regressor}.cv.tsv",
-        image=R + "/models/{regressor}.cv.png",
+        model=P.model,
+        curve=P.validation_table,
+        image=P.validation_curve,
     log:
-        R + "/logs/train/{regressor}.log",
+        P.log("train", "regressor"),
     benchmark:
-        R + "/benchmarks/train/{regressor}.tsv"
+        P.benchmark("train", "regressor")
     resources:
         mem_mb=4000,
         runtime=60,

@@ -65,7 +65,7 @@ class DeformationConfig(StageConfig):
     )
 
 
-class ShadingConfig(StageConfig):
+class ReliefConfig(StageConfig):
     """Fine relief from shading (Mono13 8), after the corrective flow where a take has it."""
 
     takes: list[str] = Field(
@@ -153,8 +153,8 @@ class DetailConfig(StageConfig):
     deformation: DeformationConfig = Field(
         default_factory=DeformationConfig, description="The mesh after the flow (Mono13 7.2)."
     )
-    shading: ShadingConfig = Field(
-        default_factory=ShadingConfig, description="Fine relief from shading (Mono13 8)."
+    relief: ReliefConfig = Field(
+        default_factory=ReliefConfig, description="Fine relief from shading (Mono13 8)."
     )
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."

@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from vermilion.config.moved import moved_keys, new_key
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.imaging.frames import list_frames
@@ -27,12 +28,17 @@ def load_configuration(
     Raises:
         ConfigurationError: listing every problem of both files.
     """
-    problems: list[str] = []
+    problems = [
+        f"{origin}, key {old}: found a key of an earlier version; expected {new}. Rename it."
+        for old, new in moved_keys(raw).items()
+    ]
     configuration = None
     try:
         configuration = Configuration(**raw)
     except ValidationError as error:
-        problems += [_sentence(origin, item) for item in error.errors()]
+        # A moved key is unknown as well: it is named once, with its new name.
+        unknown = [item for item in error.errors() if not (problems and _is_moved(item))]
+        problems += [_sentence(origin, item) for item in unknown]
     sheet = raw.get("takes", Configuration.model_fields["takes"].default)
     takes, wrong = read_takes(str(sheet))
     problems += wrong
@@ -141,7 +147,7 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
             )
     refined = {
         "takes": configuration.detail.takes,
-        "shading.takes": configuration.detail.shading.takes,
+        "relief.takes": configuration.detail.relief.takes,
     }
     for key, names in refined.items():
         for name in names:
@@ -157,6 +163,12 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"take of the sheet, written subject/take."
             )
     return problems
+
+
+def _is_moved(item: dict[str, Any]) -> bool:
+    """Whether an error of the schema is an unknown key that has moved."""
+    key = ".".join(str(part) for part in item["loc"])
+    return item["type"] == "extra_forbidden" and new_key(key) is not None
 
 
 def _sentence(origin: str, item: dict[str, Any]) -> str:

@@ -18,7 +18,6 @@ from vermilion.config.features import FeaturesConfig
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.landmarks import LandmarksConfig
 from vermilion.config.multiview import MultiviewConfig
-from vermilion.config.refinement import RefinementConfig
 from vermilion.config.studio import StudioConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.config.training import TrainingConfig
@@ -61,10 +60,6 @@ class Configuration(StageConfig):
     )
     tracking: TrackingConfig = Field(
         default_factory=TrackingConfig, description="The coarse monocular track (Lips16 3.2)."
-    )
-    refinement: RefinementConfig = Field(
-        default_factory=RefinementConfig,
-        description="Dense refinement of the track by its images (Lips16 3.2).",
     )
     detail: DetailConfig = Field(
         default_factory=DetailConfig, description="A finer sequence than C (Mono13 7)."

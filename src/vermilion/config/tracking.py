@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from vermilion.config.base import StageConfig
+from vermilion.config.image_fit import ImageFitConfig, OffsetsConfig
 
 
 class LandmarkGroups(StageConfig):
@@ -198,6 +199,12 @@ class TrackingConfig(StageConfig):
     )
     identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
     motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
+    image_fit: ImageFitConfig = Field(
+        default_factory=ImageFitConfig, description="Pose and expression from the images."
+    )
+    offsets: OffsetsConfig = Field(
+        default_factory=OffsetsConfig, description="Offsets outside the model's space."
+    )
     meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")
     scans: dict[str, ScanConfig] = Field(
         default_factory=dict,

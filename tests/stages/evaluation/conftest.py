@@ -58,7 +58,7 @@ def scene(tmp_path_factory):
         run_correspondence(root, subject)
         for chunk in CHUNKS:
             run_layers(root, subject, chunk)
-            add_contours(root / f"takes/{subject}/rom/correction/features/{chunk}.npz")
+            add_contours(root / f"takes/{subject}/rom/features/{chunk}.npz")
         write_identity(root, subject)
         run_neutral_pair(root, subject)
     run_database(root)
@@ -129,7 +129,7 @@ def evaluate(root, name, truth):
         "shapes": root / "evaluation/lip_shapes.npz",
         "fit": take / "tracking/fit.npz",
         "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
-        "features": [take / f"correction/features/{c}.npz" for c in CHUNKS],
+        "features": [take / f"features/{c}.npz" for c in CHUNKS],
         "layers": [take / f"correction/layers/{c}.npz" for c in CHUNKS],
         "models": [root / f"models/{m}.h5" for m in MODELS],
         "accurate": [take / f"multiview/H/{c}.npy" for c in CHUNKS],

@@ -36,7 +36,7 @@ def apply_chunk(scene, frames, images, out):
             "identity": scene.root / f"subjects/{SUBJECT}/identity.npz",
             "fit": take / "tracking/fit.npz",
             "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
-            "features": [take / f"correction/features/{c}.npz" for c in CHUNKS],
+            "features": [take / f"features/{c}.npz" for c in CHUNKS],
             "model": scene.root / "models/MS.h5",
         },
         output={

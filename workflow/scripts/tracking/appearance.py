@@ -16,20 +16,20 @@ from vermilion.tracking.image_fit.take import TakeStart, learn_appearance
 def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     inputs, cfg = snakemake.input, snakemake.params.cfg
-    options = cfg["refinement.appearance"]
+    options = cfg["tracking.image_fit.appearance"]
     fit, _, start = TakeStart.load(inputs, cfg)
     rows = choose_frames(start.x, fit.valid, fit.reprojection_px, options["frames"])
     if len(rows) == 0:
         raise InputError(
             "no tracked frame",
             "a face in at least one frame",
-            "Look at the landmark overlays, or switch `refinement.photometric` off.",
+            "Look at the landmark overlays, or switch `tracking.image_fit.enabled` off.",
             subject=place[0],
             take=place[1],
         )
     samples = sample_skin(start.model, options["spacing_mm"])
     face, source = start.face(samples), open_frames(snakemake.params.source, *place)
-    settings = PhotometricSettings(**cfg["refinement.fit"])
+    settings = PhotometricSettings(**cfg["tracking.image_fit.frame_fit"])
     views = []
     for row in rows:  # one whole image in memory at a time
         image = source.read(fit.camera.name, int(fit.frames[row]))

@@ -31,11 +31,11 @@ def main(snakemake):
         starts[step] = TakeStart.of(tracker, person, fit, track, settings, rows)
     face = starts["landmarks"].face(appearance.samples)
     moved = np.zeros((len(rows), tracker.n_vertices, 3))
-    if "layer" in steps:
+    if "offsets" in steps:
         moved = read_sequence(inputs.offsets)
     at = appearance.samples.matrix(tracker.triangles, tracker.n_vertices)
     source = open_frames(params.source, *place)
-    count = min(cfg["refinement.overlay_frames"], len(rows))
+    count = min(cfg["tracking.image_fit.overlay_frames"], len(rows))
     shown = set(np.linspace(0, len(rows) - 1, count).round().astype(int).tolist())
     tables, sheet = {step: [] for step in steps}, []
     for index, frame in enumerate(params.frames):
@@ -51,9 +51,9 @@ def main(snakemake):
                 "learnt_from": int(frame in appearance.frames),
             }
             if image is not None:
-                pixel_mm = cfg["refinement.appearance"]["pixel_mm"]
+                pixel_mm = cfg["tracking.image_fit.appearance"]["pixel_mm"]
                 view = start.view(index, image, face, pixel_mm, 1)
-                offsets = at @ moved[index] if step == "layer" else 0.0
+                offsets = at @ moved[index] if step == "offsets" else 0.0
                 errors, trust, places = sample_errors(view, view.start, face, appearance, offsets)
                 row["residual"] = photometric_residual(errors, trust)
                 results.append((f"{step} {row['residual']:.2f}", errors, trust, places))

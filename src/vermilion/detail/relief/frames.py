@@ -58,7 +58,7 @@ class Scene:
         def read_image(frame):
             return frames.read(camera.name, frame)
 
-        return cls(topology, camera, read_image, read_mesh, cfg["detail.shading.face_px"])
+        return cls(topology, camera, read_image, read_mesh, cfg["detail.relief.face_px"])
 
     def fine(self, frame: int) -> np.ndarray:
         """Smooth fine mesh (V', 3)."""

@@ -10,8 +10,8 @@ COLUMNS = ["subject", "take", "basis", "step", "residual", "held_out", "frames"]
 BASES = {
     "before_flow": "texture of the first frame",
     "flow": "texture of the first frame",
-    "before_shading": "light and albedo of the first frames",
-    "shading": "light and albedo of the first frames",
+    "before_relief": "light and albedo of the first frames",
+    "relief": "light and albedo of the first frames",
 }
 
 

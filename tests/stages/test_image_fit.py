@@ -7,7 +7,6 @@ import pytest
 
 from tests.stages.run_script import run_script
 from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion, take_parts
-from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.imaging.images import read_image, write_image
 from vermilion.storage.sequences import read_sequence
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.slow
 N_FRAMES = 6
 MODEL = dome()
 NAMES = {"subject": "s", "take": "t"}
-STEPS = ["landmarks", "photometric", "layer"]
+STEPS = ["landmarks", "image_fit", "offsets"]
 
 
 def run_stage(root, sizes):
@@ -53,8 +52,9 @@ def run_stage(root, sizes):
         chunks.append(frames)
         first += size
     cfg = {f"tracking.{k}": v for k, v in TrackingConfig().model_dump(mode="json").items()}
-    cfg |= {f"refinement.{k}": v for k, v in RefinementConfig().model_dump(mode="json").items()}
-    cfg["refinement.appearance"]["frames"] = 4
+    image_fit = TrackingConfig().image_fit.model_dump(mode="json")
+    cfg |= {f"tracking.image_fit.{k}": v for k, v in image_fit.items()}
+    cfg["tracking.image_fit.appearance"]["frames"] = 4
     both = {"tracker": root / "tracker.npz", "identity": root / "identity.npz"}
     before = both | {"fit": root / "landmark_fit.npz"}
     run_script(
@@ -67,25 +67,25 @@ def run_stage(root, sizes):
     with_appearance = {"appearance": root / "appearance.npz"}
     for frames, path in zip(chunks, landmarks, strict=True):
         run_script(
-            "tracking/photometric",
+            "tracking/image_fit",
             wildcards=NAMES,
             params={"cfg": cfg, "source": str(root), "frames": frames},
             input=before | with_appearance | {"landmarks": path},
-            output={0: root / "photometric" / path.name},
+            output={0: root / "image_fit" / path.name},
         )
     run_script(
-        "tracking/photometric_join",
+        "tracking/image_fit_join",
         wildcards=NAMES,
         params={"cfg": cfg, "fps": 30.0},
         input=before
-        | {"chunks": [root / "photometric" / p.name for p in landmarks], "landmarks": landmarks},
+        | {"chunks": [root / "image_fit" / p.name for p in landmarks], "landmarks": landmarks},
         output={"fit": root / "fit.npz"},
     )
     after = both | with_appearance | {"fit": root / "fit.npz"}
     for frames, path in zip(chunks, landmarks, strict=True):
         offsets = root / "offsets" / f"{path.stem}.npy"
         run_script(
-            "tracking/corrective_layer",
+            "tracking/offsets",
             wildcards=NAMES,
             params={"cfg": cfg, "source": str(root), "frames": frames},
             input=after | {"landmarks": path},

@@ -12,11 +12,11 @@ from vermilion.storage.logfile import log_to
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     model = FaceModel.load(inputs.tracker)
-    topology = FineTopology.of(model, cfg["detail.shading.levels"])
+    topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     scene = Scene.open(topology, inputs, params.source, place, (first, last), cfg)
-    frames, seen = range(first, min(first + cfg["detail.shading.light_frames"], last + 1)), {}
+    frames, seen = range(first, min(first + cfg["detail.relief.light_frames"], last + 1)), {}
     for frame in frames:
         try:
             seen[frame] = scene.sight(frame, scene.fine(frame))
@@ -26,14 +26,14 @@ def main(snakemake):
         raise InputError(
             f"no face in the frames {frames[0]} to {frames[-1]}",
             "a first frame that shows the face",
-            "Begin the take where the face is seen, or raise detail.shading.light_frames.",
+            "Begin the take where the face is seen, or raise detail.relief.light_frames.",
             subject=place[0],
             take=place[1],
         )
     smooth = scene.fine(first)
     centres = smooth[topology.skin_ids][topology.skin].mean(axis=1)
     light = estimate_light(
-        list(seen), list(seen.values()), topology, centres, cfg["detail.shading.detail_mm"]
+        list(seen), list(seen.values()), topology, centres, cfg["detail.relief.detail_mm"]
     )
     light.save(snakemake.output.light)
     uv = topology.finer @ model.uv

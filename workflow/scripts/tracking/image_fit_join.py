@@ -14,7 +14,7 @@ def main(snakemake):
     names = ["x", "matrix", "right", "refined"]
     found = read_chunks(inputs.chunks, fit.frames, names)
     # Images tell weights and depth with more noise than landmarks do: so they are smoothed more.
-    smooth = replace(start.settings, **cfg["refinement.join"])
+    smooth = replace(start.settings, **cfg["tracking.image_fit.join"])
     x = join_frames(
         found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth
     )

@@ -14,14 +14,14 @@ def main(snakemake):
     appearance = Appearance.load(inputs.appearance)
     fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
     face, source = start.face(appearance.samples), open_frames(params.source, *place)
-    settings = PhotometricSettings(**cfg["refinement.fit"])
+    settings = PhotometricSettings(**cfg["tracking.image_fit.frame_fit"])
     problem = FrameProblem(face, appearance, settings, start.settings.weight_sigma)
     refined = refine_frames(
         start,
         fit.valid[rows],
         lambda index: source.read(fit.camera.name, int(params.frames[index])),
         problem,
-        cfg["refinement.appearance"]["pixel_mm"],
+        cfg["tracking.image_fit.appearance"]["pixel_mm"],
     )
     write_arrays(snakemake.output[0], frames=fit.frames[rows], **refined)
 

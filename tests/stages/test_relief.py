@@ -44,7 +44,7 @@ def run_stage(root, paths):
         shading={"levels": 0, "light_frames": 2, "map_px": 32, "noise_floor": 0.5}
     ).shading.model_dump(mode="json")
     params = {
-        "cfg": {f"detail.shading.{key}": value for key, value in shading.items()},
+        "cfg": {f"detail.relief.{key}": value for key, value in shading.items()},
         "source": str(root), "span": [0, N_FRAMES - 1],
     }  # fmt: skip
     files = {"tracker": root / "tracker.npz", "fit": root / "fit.npz", "meshes": paths}
@@ -52,15 +52,13 @@ def run_stage(root, paths):
     files["light"] = out / "light.npz"
     place = {"subject": "s", "take": "t"}
     made = {"light": files["light"], "topology": out / "topology.obj"}
-    run_script("detail/shading_light", wildcards=place, params=params, input=files, output=made)
+    run_script("detail/relief_light", wildcards=place, params=params, input=files, output=made)
     reliefs = [out / "relief" / f"{path.stem}.npz" for path in paths]
     for relief in reliefs:
         first, last = (int(n) for n in relief.stem.split("-"))
         params["frames"] = list(range(first, last + 1))
         made = {"relief": relief}
-        run_script(
-            "detail/shading_relief", wildcards=place, params=params, input=files, output=made
-        )
+        run_script("detail/relief", wildcards=place, params=params, input=files, output=made)
     for path in paths:
         first, last = (int(n) for n in path.stem.split("-"))
         params["frames"] = list(range(first, last + 1))
@@ -74,7 +72,7 @@ def run_stage(root, paths):
         }
         inputs = {**files, "reliefs": reliefs}
         run_script(
-            "detail/shading_meshes", wildcards=place, params=params, input=inputs, output=made
+            "detail/relief_meshes", wildcards=place, params=params, input=inputs, output=made
         )
     return read_sequence([out / path.name for path in paths])
 

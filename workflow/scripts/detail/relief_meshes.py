@@ -29,14 +29,14 @@ def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
-    topology = FineTopology.of(model, cfg["detail.shading.levels"])
+    topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
     own = params.frames[0], params.frames[-1]
     scene = Scene.open(topology, inputs, params.source, place, own, cfg)
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
-    maps = NormalMap(topology, model.uv, cfg["detail.shading.map_px"])
-    window, weight = cfg["detail.shading.window"], cfg["detail.shading.position_weight"]
-    count = min(cfg["detail.shading.overlay_frames"], len(params.frames))
+    maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
+    window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
+    count = min(cfg["detail.relief.overlay_frames"], len(params.frames))
     shown = set(np.linspace(0, len(params.frames) - 1, count).round().astype(int).tolist())
     meshes, quality, panels = [], [], []
     with atomic_folder(snakemake.output.maps) as folder:
@@ -55,7 +55,7 @@ def main(snakemake):
                 )
     blank = np.zeros((64, 256, 3), dtype=np.uint8)
     write_srgb8(snakemake.output.overlay, tile(panels, 4) if panels else blank)
-    write_quality(snakemake.output.quality, *place, "shading", quality)
+    write_quality(snakemake.output.quality, *place, "relief", quality)
     for name, path in (("before", snakemake.output.start), ("after", snakemake.output.after)):
         rows = [
             {

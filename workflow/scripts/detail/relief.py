@@ -12,12 +12,12 @@ from vermilion.storage.logfile import log_to
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    topology = FineTopology.of(FaceModel.load(inputs.tracker), cfg["detail.shading.levels"])
+    topology = FineTopology.of(FaceModel.load(inputs.tracker), cfg["detail.relief.levels"])
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     span = (params.frames[0], params.frames[-1])
     scene = Scene.open(topology, inputs, params.source, place, span, cfg)
     settings = ReliefSettings(
-        **{f.name: cfg[f"detail.shading.{f.name}"] for f in fields(ReliefSettings)}
+        **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
     )
     relief_of(scene, params.frames, ClipLight.load(inputs.light), settings).save(
         snakemake.output.relief

@@ -16,9 +16,10 @@ def main(snakemake):
     appearance = Appearance.load(inputs.appearance)
     fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
     face, source = start.face(appearance.samples), open_frames(params.source, *place)
-    settings = LayerSettings(**cfg["refinement.offsets"])
+    options = {k: v for k, v in cfg["tracking.offsets"].items() if k != "enabled"}
+    settings = LayerSettings(**options)
     layer = CorrectiveLayer(start.model, start.identity.neutral_mm, face, appearance, settings)
-    pixel_mm = cfg["refinement.appearance"]["pixel_mm"]
+    pixel_mm = cfg["tracking.image_fit.appearance"]["pixel_mm"]
     offsets = np.zeros((len(rows), start.model.n_vertices, 3))
 
     def read(index: int) -> np.ndarray:

@@ -4,11 +4,11 @@
 rule face_archive:
     """Downloads the pinned ICT-FaceKit archive and checks its SHA-256."""
     output:
-        f"{R}/face/ict-facekit.archive",
+        P.face_archive,
     log:
-        f"{R}/logs/face_archive.log",
+        P.log("face_archive", "run"),
     benchmark:
-        f"{R}/benchmarks/face_archive.tsv"
+        P.benchmark("face_archive", "run")
     localrule: True
     resources:
         mem_mb=500,
@@ -25,7 +25,7 @@ def face_source(wildcards):
     model = CONFIG.face_model
     if model.name == "procedural":
         return []
-    return [model.path] if model.path else [f"{R}/face/ict-facekit.archive"]
+    return [model.path] if model.path else [P.face_archive]
 
 
 rule face_model:
@@ -33,9 +33,9 @@ rule face_model:
     input:
         source=face_source,
     output:
-        multiext(f"{R}/face/", studio="studio.npz", template="template.npz", tracker="tracker.npz"),
+        multiext(P.face_models, studio="studio.npz", template="template.npz", tracker="tracker.npz"),
     log:
-        f"{R}/logs/face_model.log",
+        P.log("face_model", "run"),
     cache: True
     resources:
         mem_mb=3000,

@@ -1,4 +1,4 @@
-"""Configuration of the dense refinement of the track (Lips16 3.2)."""
+"""Configuration of the track's fit to the images, and of its offsets (Lips16 3.2)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class AppearanceConfig(StageConfig):
     )
 
 
-class PhotometricConfig(StageConfig):
+class FrameFitConfig(StageConfig):
     """Pose and expression from the images: how much they count beside the landmarks."""
 
     sigma: float = Field(
@@ -68,7 +68,7 @@ class PhotometricConfig(StageConfig):
 
 
 class JoinConfig(StageConfig):
-    """The refined frames of a take as one track."""
+    """The fitted frames of a take as one track."""
 
     weight_acceleration: float = Field(
         15.0,
@@ -86,9 +86,10 @@ class JoinConfig(StageConfig):
     )
 
 
-class LayerConfig(StageConfig):
-    """The corrective layer outside the model's space: offsets parallel to the image."""
+class OffsetsConfig(StageConfig):
+    """Offsets of the vertices outside the model's space, parallel to the image (Lips16 3.2)."""
 
+    enabled: bool = Field(False, description="Add the offsets to the meshes.")
     sigma_mm: float = Field(2.0, gt=0, le=100, description="Deviation of an offset (mm).")
     length_mm: float = Field(
         20.0, gt=0, le=1e3, description="Length over which offsets are alike (mm)."
@@ -107,25 +108,20 @@ class LayerConfig(StageConfig):
     )
 
 
-class RefinementConfig(StageConfig):
-    """Dense refinement of the track by its images: analysis by synthesis (Lips16 3.2)."""
+class ImageFitConfig(StageConfig):
+    """Pose and expression from the images: analysis by synthesis (Lips16 3.2)."""
 
-    photometric: bool = Field(
-        True, description="Refine pose and expression; off: the landmark fit is the track."
-    )
-    layer: bool = Field(
-        False, description="Add the corrective layer outside the model's space to the meshes."
+    enabled: bool = Field(
+        True,
+        description="Fit pose and expression to the images; off: the landmark fit is the track.",
     )
     appearance: AppearanceConfig = Field(
         default_factory=AppearanceConfig, description="Lighting and albedo."
     )
-    fit: PhotometricConfig = Field(
-        default_factory=PhotometricConfig, description="Pose and expression from the images."
+    frame_fit: FrameFitConfig = Field(
+        default_factory=FrameFitConfig, description="Pose and expression of one frame."
     )
-    join: JoinConfig = Field(
-        default_factory=JoinConfig, description="The refined frames as one track."
-    )
-    offsets: LayerConfig = Field(default_factory=LayerConfig, description="The corrective layer.")
+    join: JoinConfig = Field(default_factory=JoinConfig, description="The frames as one track.")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )
