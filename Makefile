@@ -13,7 +13,7 @@ help:
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
-	@echo "make lint        style of Python and Snakemake files"
+	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
 	@echo "make docs        regenerate the configuration reference and schemas"
 	@echo "make clean       remove the environment and caches (results stay)"
 
@@ -47,6 +47,8 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/python tools/check_docstrings.py src
+	$(BIN)/mypy
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

@@ -1,0 +1,180 @@
+"""The house as docs/architecture.md draws it: floors, no circles, modules and functions of a size."""
+
+import ast
+import re
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from vermilion.config.root import Configuration
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "vermilion"
+#: Rooms from the ground up. A room imports from floors below, and on its own floor from rooms that
+#: stand before it.
+FLOORS = (
+    ("storage", "provenance", "geometry", "imaging"),
+    ("config", "faces", "appearance"),
+    (
+        "studio", "capture", "landmarks", "multiview", "inpaint", "scan", "tracking", "detail",
+        "contours", "correspondence", "features",
+    ),
+    ("regression", "database", "correction", "guided", "baselines", "evaluation"),
+    ("export", "report"),
+    ("app",),
+)  # fmt: skip
+ORDER = [room for floor in FLOORS for room in floor]
+
+MODULE_LINES, FUNCTION_LINES, PARAMETERS = 300, 60, 9
+#: Compiled kernels: one loop over pixels or triangles with all its arrays as arguments.
+KERNELS = {("studio/kernels.py", "shade"), ("geometry/closest_points.py", "_closest_of")}
+
+#: Stage -> where its name differs, and why.
+PACKAGE_OF = {
+    "face_model": "faces",  # one interface, many models
+    "training": "regression",  # estimators serve guided correction as well
+    "apply": "export",  # applying is correction; what is the stage's own is its files
+}
+#: Rule files that are no stage.
+SHARED_RULES = {"common", "paths", "targets"}
+#: Stages that have no section of their own: what they read belongs to another stage's section.
+WITHOUT_SECTION = {"scan": "tracking.scans", "report": "evaluation.figures"}
+#: Sections that are no stage: names of files and folders.
+PLAIN_KEYS = {"results", "takes", "chunk_frames"}
+
+
+def name_of(path):
+    return ".".join(path.relative_to(SOURCE).with_suffix("").parts)
+
+
+@cache
+def modules():
+    """Module name -> its syntax tree."""
+    return {name_of(path): ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
+
+
+@cache
+def imports():
+    """Module name -> modules of the library that it imports, wherever the import stands."""
+    found = defaultdict(set)
+    for name, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vermilion."):
+                base = node.module.removeprefix("vermilion.")
+                for alias in node.names:
+                    whole = f"{base}.{alias.name}"
+                    found[name].add(whole if whole in modules() else base)
+    return found
+
+
+def test_every_room_has_a_floor():
+    rooms = {name.split(".")[0] for name in modules()} - {"__init__"}
+    assert rooms <= set(ORDER)
+
+
+def test_no_room_imports_from_a_higher_one():
+    wrong = [
+        f"{name} imports {other}"
+        for name, others in imports().items()
+        for other in sorted(others)
+        if name != "__init__" and ORDER.index(other.split(".")[0]) > ORDER.index(name.split(".")[0])
+    ]
+    assert wrong == []
+
+
+def test_no_circle_of_imports():
+    done, open_ = set(), []
+
+    def visit(name):
+        if name in open_:
+            raise AssertionError(" -> ".join([*open_[open_.index(name) :], name]))
+        if name in done:
+            return
+        open_.append(name)
+        for other in sorted(imports()[name]):
+            visit(other)
+        open_.pop()
+        done.add(name)
+
+    for name in sorted(modules()):
+        visit(name)
+
+
+@pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
+def test_a_module_is_one_idea(folder):
+    paths = [path for path in (ROOT / folder).rglob("*.py")]
+    assert paths
+    long = {str(p.relative_to(ROOT)): len(p.read_text().splitlines()) for p in paths}
+    assert {name: lines for name, lines in long.items() if lines > MODULE_LINES} == {}
+
+
+def functions(folder):
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                place = str(path.relative_to(ROOT / folder))
+                if (place, node.name) not in KERNELS:
+                    yield f"{folder}/{place}:{node.name}", node
+
+
+@pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
+def test_a_function_fits_on_a_screen(folder):
+    long = {
+        name: node.end_lineno - node.lineno + 1
+        for name, node in functions(folder)
+        if node.end_lineno - node.lineno + 1 > FUNCTION_LINES
+    }
+    assert long == {}
+
+
+@pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
+def test_a_function_has_few_parameters(folder):
+    many = {}
+    for name, node in functions(folder):
+        arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+        count = sum(argument.arg not in ("self", "cls") for argument in arguments)
+        if count > PARAMETERS:
+            many[name] = count
+    assert many == {}
+
+
+def stages():
+    """Names of the rule files that are stages."""
+    rules = (ROOT / "workflow" / "rules").glob("*.smk")
+    return {path.stem for path in rules} - SHARED_RULES
+
+
+@pytest.mark.parametrize("stage", sorted(stages()))
+def test_a_stage_has_one_name(stage):
+    """Configuration key = rule file = script folder = package."""
+    assert (ROOT / "workflow" / "scripts" / stage).is_dir()
+    assert (SOURCE / PACKAGE_OF.get(stage, stage) / "__init__.py").is_file()
+    assert stage in Configuration.model_fields or stage in WITHOUT_SECTION
+
+
+def test_every_section_is_a_stage():
+    assert set(Configuration.model_fields) - PLAIN_KEYS <= stages()
+
+
+def test_every_folder_of_scripts_is_a_stage():
+    folders = {path.name for path in (ROOT / "workflow" / "scripts").iterdir() if path.is_dir()}
+    assert folders - {"__pycache__"} == stages()
+
+
+def test_a_path_of_the_results_is_spelt_once():
+    """Rule files take paths from paths.smk: none of them spells a results folder by itself."""
+    for path in (ROOT / "workflow" / "rules").glob("*.smk"):
+        if path.stem != "paths":
+            code = re.sub(r'"""(?:.|\n)*?"""', "", path.read_text())
+            assert not re.search(r"\{subject\}/\{take\}[/\"]|/takes/|/subjects/", code.replace(
+                '"{subject}/{take}', ""
+            )), path.name  # fmt: skip
+
+
+def test_each_path_has_one_name():
+    text = (ROOT / "workflow" / "rules" / "paths.smk").read_text()
+    values = re.findall(r"^    \w+ = (.+)$", text, re.MULTILINE)
+    assert len(values) > 80
+    assert len(values) == len(set(values))
