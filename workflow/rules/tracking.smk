@@ -43,16 +43,16 @@ def sampled_takes(wildcards):
     ]
 
 
-def imaged_subjects():
+def image_identity_subjects():
     """Subjects whose identity images tell of: a model that a scan gave has none to choose from."""
     if not CONFIG.tracking.identity.images.enabled:
         return set()
     return {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
 
 
-def from_images():
+def image_identity_pattern():
     """Regular expression of these subjects (none: matches nothing)."""
-    names = sorted(subject.replace(".", r"\.") for subject in imaged_subjects())
+    names = sorted(subject.replace(".", r"\.") for subject in image_identity_subjects())
     return "|".join(names) or "(?!)"
 
 
@@ -98,7 +98,7 @@ rule image_identity:
     benchmark:
         P.benchmark("image_identity", "subject")
     wildcard_constraints:
-        subject=from_images(),
+        subject=image_identity_pattern(),
     resources:
         mem_mb=1500,
         runtime=30,
