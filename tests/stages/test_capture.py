@@ -7,6 +7,7 @@ import json
 import numpy as np
 
 from tests.stages.run_script import run_script
+from tests.unit.small_videos import HEIGHT, scene, write_clip
 from tests.unit.test_calibrate import BOARD, SIZE, board_poses, make_rig, render
 from vermilion.geometry.camera import read_cameras
 from vermilion.imaging.images import write_srgb8
@@ -39,6 +40,7 @@ def check(source, out, frames=FRAMES):
             "camera": "mid",
             "multiview": True,
             "frames": frames,
+            "fps": None,
         },
         output={
             "manifest": out / f"capture/{chunk}.json",
@@ -85,3 +87,43 @@ def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
     expected_mm = np.linalg.norm(truth["left"].centre_mm - truth["mid"].centre_mm)
     assert abs(baseline_mm - expected_mm) < 1.0
     assert (out / "capture/overlay/cameras.png").is_file()
+
+
+def test_a_video_is_hashed_once_and_its_rate_held_against_the_sheet(tmp_path):
+    frames = [scene(moment) for moment in range(8)]
+    turned = write_clip(
+        tmp_path / "clip.mp4", frames, prepare=lambda stream: stream.set_display_rotation(-90)
+    )
+    facts = tmp_path / "video.json"
+    run_script("video_facts", input={0: turned}, output={0: facts}, log=tmp_path / "log")
+    for first, last, fps in ((0, 3, 30.0), (4, 7, None)):
+        chunk = f"{first:06d}-{last:06d}"
+        run_script(
+            "capture/capture",
+            wildcards={"subject": "s1", "take": "t1", "chunk": chunk},
+            params={
+                "cfg": {"capture.manifest": {"hash_decoded": False}},
+                "source": str(turned),
+                "camera": "cam",
+                "multiview": False,
+                "frames": list(range(first, last + 1)),
+                "fps": fps,
+            },
+            input={"video": facts},
+            output={
+                "manifest": tmp_path / f"{chunk}.json",
+                "quality": tmp_path / f"{chunk}.tsv",
+                "overlay": tmp_path / f"{chunk}.png",
+            },
+            log=tmp_path / "log",
+        )
+    manifests = [
+        json.loads((tmp_path / f"{chunk}.json").read_text())
+        for chunk in ("000000-000003", "000004-000007")
+    ]
+    sha256 = json.loads(facts.read_text())["sha256"]
+    assert [manifest["video"]["sha256"] for manifest in manifests] == [sha256, sha256]
+    assert manifests[0]["cameras"]["cam"]["width_px"] == HEIGHT  # upright
+    rows = read_table(tmp_path / "000000-000003.tsv")
+    assert "25 frames a second, the take sheet says 30" in rows["reason"][0]
+    assert read_table(tmp_path / "000004-000007.tsv")["reason"].isna().all()

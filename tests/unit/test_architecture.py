@@ -104,7 +104,7 @@ def test_no_circle_of_imports():
 
 @pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
 def test_a_module_is_one_idea(folder):
-    paths = [path for path in (ROOT / folder).rglob("*.py")]
+    paths = list((ROOT / folder).rglob("*.py"))
     assert paths
     long = {str(p.relative_to(ROOT)): len(p.read_text().splitlines()) for p in paths}
     assert {name: lines for name, lines in long.items() if lines > MODULE_LINES} == {}

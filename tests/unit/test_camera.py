@@ -51,7 +51,7 @@ def test_resizing_scales_pixels(cameras):
 
 
 def test_folder_without_cameras_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"no cameras.txt.*COLMAP text model"):
+    with pytest.raises(InputError, match=r"no cameras.txt.*COLMAP model"):
         read_cameras(tmp_path)
 
 

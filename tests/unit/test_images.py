@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vermilion.imaging.frames import list_frames, open_frames
+from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import (
     image_size,
     linear_to_srgb,
@@ -75,12 +75,6 @@ def test_missing_frame_and_camera_are_named(tmp_path):
         frames.read("a", 2)
     with pytest.raises(InputError, match=r"camera b.*no such folder"):
         frames.read("b", 1)
-
-
-def test_numbers_of_frames_are_read_from_usual_names(tmp_path):
-    for name in ("shot_0012.png", "000013.jpg", "plate.14.exr", "notes.txt", ".tmp15.png"):
-        (tmp_path / name).touch()
-    assert list(list_frames(tmp_path)) == [12, 13, 14]
 
 
 def test_every_frame_of_a_video_is_the_right_one(tmp_path):

@@ -4,7 +4,8 @@ from functools import cache
 
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import IMAGE_SUFFIXES
-from vermilion.imaging.video import VIDEO_SUFFIXES
+from vermilion.geometry.colmap import model_files
+from vermilion.imaging.source import folder_of, is_video
 
 
 @cache
@@ -20,11 +21,10 @@ def capture_files(source):
 
 
 def camera_files(source):
-    """The calibration that a capture brings: COLMAP text, or images of a board."""
-    source = Path(source)
-    if (source / "cameras").is_dir():
-        return sorted(str(path) for path in (source / "cameras").glob("*.txt"))
-    views = source.glob("calibration/*/*")
+    """The calibration that a capture brings: a COLMAP model, or images of a board."""
+    if folder_of(source, "cameras").is_dir():
+        return [str(path) for path in model_files(folder_of(source, "cameras"))]
+    views = folder_of(source, "calibration").glob("*/*")
     return sorted(str(path) for path in views if path.suffix.lower() in IMAGE_SUFFIXES)
 
 
@@ -34,7 +34,7 @@ def capture_inputs(wildcards):
     if take.source == STUDIO:
         images = studio_frames(wildcards, wildcards.chunk)
         return images + studio_cameras(wildcards)
-    if Path(take.source).suffix.lower() in VIDEO_SUFFIXES:
+    if is_video(take.source):
         return [take.source]
     files = capture_files(take.source)
     images = [path for frame in frames_in(wildcards.chunk) for path in files.get(frame, [])]
@@ -45,13 +45,44 @@ def camera_inputs(wildcards):
     """The calibration of a take: its files, or what the studio writes beside its images."""
     if take_of(wildcards).source == STUDIO:
         return studio_cameras(wildcards)
-    return camera_files(source_of(wildcards))
+    return camera_files(take_of(wildcards).source)
+
+
+def facts_of_video(wildcards):
+    """The facts of a take's video file, which are found once; nothing for images."""
+    return fill(P.video_facts, wildcards) if is_video(take_of(wildcards).source) else []
+
+
+def rate_to_compare(wildcards):
+    """The sheet's rate in the first chunk of a take, where the file's is held against it."""
+    take = take_of(wildcards)
+    return take.fps if frames_in(wildcards.chunk)[0] == take.first else None
+
+
+rule video_facts:
+    """Hashes a video file and lists its frames, once a take: capture/video.json."""
+    input:
+        lambda wildcards: take_of(wildcards).source,
+    output:
+        P.video_facts,
+    log:
+        P.log("video_facts", "take"),
+    benchmark:
+        P.benchmark("video_facts", "take")
+    resources:
+        mem_mb=400,
+        runtime=30,
+    params:
+        code=code_of("capture/video_facts"),
+    script:
+        "../scripts/capture/video_facts.py"
 
 
 rule capture:
     """Checks every image of a chunk whole: capture/{chunk}.json, quality rows, contact sheet."""
     input:
-        capture_inputs,
+        files=capture_inputs,
+        video=facts_of_video,
     output:
         manifest=P.manifest,
         quality=P.capture_quality,
@@ -70,6 +101,7 @@ rule capture:
         camera=mono_camera,
         multiview=lambda wildcards: take_of(wildcards).is_multiview,
         frames=chunk_frames,
+        fps=rate_to_compare,
     script:
         "../scripts/capture/capture.py"
 

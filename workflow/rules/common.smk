@@ -149,9 +149,17 @@ def near_chunks(wildcards, reach):
 
 
 def source_of(wildcards):
-    """Where the images of a take lie: what the sheet says, or the studio's capture folder."""
-    take = take_of(wildcards)
-    return fill(P.capture_folder, take) if take.source == STUDIO else take.source
+    """Where the images of a take lie: what the sheet says, or the studio's capture folder.
+
+    A plain path, or one with how its image files are read where the configuration says that.
+    """
+    take, capture = take_of(wildcards), CONFIG.capture
+    if take.source == STUDIO:
+        return fill(P.capture_folder, take)
+    if not (capture.exr_layer or capture.colour_space):
+        return take.source
+    reading = {"exr_layer": capture.exr_layer, "colour_space": capture.colour_space}
+    return {"path": take.source, **reading}
 
 
 def mono_patterns(wildcards):

@@ -37,6 +37,7 @@ class P:
 
     # capture
     manifest = _TAKE + "/capture/{chunk}.json"
+    video_facts = _TAKE + "/capture/video.json"
     capture_quality = _TAKE + "/capture/quality/{chunk}.tsv"
     capture_overlay = _TAKE + "/capture/overlay/{chunk}.png"
     cameras = _TAKE + "/cameras"

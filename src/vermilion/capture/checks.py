@@ -7,6 +7,8 @@ from pathlib import Path
 
 import OpenImageIO as oiio
 
+from vermilion.imaging.images import AS_TAGGED, ImageReading, image_size, shown_size
+from vermilion.storage.errors import InputError
 from vermilion.storage.files import sha256_of
 
 
@@ -17,7 +19,7 @@ class ImageFacts:
     Attributes:
         file: path relative to the capture.
         size_bytes, sha256: of the file.
-        width_px, height_px: of the image.
+        width_px, height_px: of the image as it is read: upright, square pixels, display window.
         channels: number of channels.
         bits: bits a channel.
     """
@@ -35,7 +37,10 @@ class ImageFacts:
 
 
 def check_image(
-    path: Path, root: Path, expected_size: tuple[int, int] | None
+    path: Path,
+    root: Path,
+    expected_size: tuple[int, int] | None,
+    reading: ImageReading = AS_TAGGED,
 ) -> tuple[ImageFacts | None, str]:
     """Read an image whole.
 
@@ -43,6 +48,7 @@ def check_image(
         path: the file.
         root: the capture; `ImageFacts.file` is relative to it.
         expected_size: (width, height), None for any.
+        reading: what the file does not say of itself.
 
     Returns:
         (facts, "") or (facts or None, reason why the image cannot be used).
@@ -54,6 +60,11 @@ def check_image(
     stream = oiio.ImageInput.open(str(path))
     if not stream:
         return None, f"unreadable: {_one_line(oiio.geterror())}"
+    try:
+        width, height = shown_size(stream, path, reading)
+    except InputError as error:
+        stream.close()
+        return None, error.brief
     spec = stream.spec()
     pixels = stream.read_image(spec.format)
     failed = stream.has_error
@@ -65,26 +76,23 @@ def check_image(
         file=path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name,
         size_bytes=path.stat().st_size,
         sha256=sha256_of(path),
-        width_px=spec.width,
-        height_px=spec.height,
+        width_px=width,
+        height_px=height,
         channels=spec.nchannels,
         bits=8 * spec.format.size(),
     )
-    if expected_size is not None and (spec.width, spec.height) != tuple(expected_size):
-        width, height = expected_size
-        return facts, f"size {spec.width}x{spec.height}, expected {width}x{height}"
+    if expected_size is not None and (width, height) != tuple(expected_size):
+        wanted = "{}x{}".format(*expected_size)
+        return facts, f"size {width}x{height}, expected {wanted}"
     return facts, ""
 
 
-def header_size(path: Path) -> tuple[int, int] | None:
+def header_size(path: Path, reading: ImageReading = AS_TAGGED) -> tuple[int, int] | None:
     """(width, height) from the header alone; None where it cannot be read."""
-    stream = oiio.ImageInput.open(str(path)) if path.is_file() else None
-    if not stream:
-        oiio.geterror()  # clears it
+    try:
+        return image_size(path, reading)
+    except InputError:
         return None
-    spec = stream.spec()
-    stream.close()
-    return spec.width, spec.height
 
 
 def _one_line(message: str) -> str:

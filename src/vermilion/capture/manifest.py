@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from vermilion.capture.checks import check_image, header_size
+from vermilion.capture.video_facts import VideoFacts, rate_warning, video_facts
 from vermilion.geometry.camera import read_cameras
-from vermilion.imaging.frames import list_frames
-from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.imaging.frames import list_frames, reading_of
+from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
+from vermilion.imaging.source import Source, folder_of, is_video, source_path
+from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError, describe_problem
-from vermilion.storage.files import atomic_path, sha256_of
+from vermilion.storage.files import atomic_path
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -25,21 +29,24 @@ class Manifest:
     """What a chunk of a take holds.
 
     Attributes:
+        source: a path, or a path with how its images are read (see `imaging.source`).
         kind: `capture` (folders of frames of named cameras), `frames` (one folder) or `video`.
         cameras: name -> {width_px, height_px, channels, bits}; the size the images should have.
         frames: camera -> frame -> facts of the file (empty for a video).
         bad: camera -> frame -> reason.
         video: facts of the video file, empty otherwise.
+        warnings: what is true of the whole take and stops nothing.
     """
 
     subject: str
     take: str
-    source: str
+    source: str | dict[str, str]
     kind: str
     cameras: dict[str, dict] = field(default_factory=dict)
     frames: dict[str, dict[int, dict]] = field(default_factory=dict)
     bad: dict[str, dict[int, str]] = field(default_factory=dict)
     video: dict = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
 
     def save(self, path: str | Path) -> None:
         """Write as JSON, sorted, whole or not at all."""
@@ -71,12 +78,14 @@ def load_manifest(path: str | Path) -> Manifest:
 
 
 def capture_manifest(
-    source: str | Path,
+    source: Source,
     subject: str,
     take: str,
     frames: Sequence[int],
     cameras: Sequence[str] | None = None,
     hash_decoded: bool = False,
+    video: VideoFacts | None = None,
+    fps: float | None = None,
 ) -> Manifest:
     """Check the images of a chunk.
 
@@ -88,14 +97,20 @@ def capture_manifest(
         frames: frame numbers of the chunk.
         cameras: names to check; all of the rig by default.
         hash_decoded: also hash the decoded frames of a video.
+        video: facts of the video file, where they were found before; else it is read here.
+        fps: rate of the take sheet, to warn where the video's differs; None: not compared.
 
     Raises:
-        InputError listing everything that stops the take: a camera of the rig without images,
-        or whose images all disagree with its calibration.
+        InputError listing everything that stops the take: a camera of the rig without images, or
+        whose images all disagree with its calibration, or are of a kind that is not read.
     """
-    source = Path(source)
-    if source.suffix.lower() in VIDEO_SUFFIXES:
-        return _video_manifest(source, subject, take, frames, cameras, hash_decoded)
+    reading, named = reading_of(source), source
+    source = source_path(source)
+    if is_video(source):
+        facts = video or video_facts(source)
+        manifest = _video_manifest(source, subject, take, frames, cameras, hash_decoded, facts)
+        warning = "" if fps is None else rate_warning(facts, fps)
+        return replace(manifest, warnings=[warning] if warning else [])
     rig = source / "frames"
     kind = "capture" if rig.is_dir() else "frames"
     folders = (
@@ -106,26 +121,36 @@ def capture_manifest(
     sizes = _calibrated_sizes(source)
     wanted = list(cameras) if cameras else sorted(set(folders) | set(sizes))
     place = {"subject": subject, "take": take}
-    manifest = Manifest(subject, take, str(source), kind)
+    kept = dict(named) if isinstance(named, Mapping) else str(named)
+    manifest = Manifest(subject, take, kept, kind)
     problems = []
     for camera in wanted:
         paths = list_frames(folders[camera]) if camera in folders else {}
-        if not paths:
-            problems.append(
-                describe_problem(
-                    "no image",
-                    "numbered frames of every camera of the rig",
-                    "Add the camera's frames, or take it out of the rig.",
-                    camera=camera,
-                    path=folders.get(camera, rig / camera),
-                    **place,
-                )
-            )
-            continue
-        problems += _check_camera(manifest, camera, paths, frames, sizes, source)
+        unusable = _unusable(paths, folders.get(camera, rig / camera), reading, camera, place)
+        problems += (
+            [unusable]
+            if unusable
+            else _check_camera(manifest, camera, paths, frames, sizes, source, reading)
+        )
     if problems:
         raise _fatal(problems, source, place)
     return manifest
+
+
+def _unusable(
+    paths: dict[int, Path], folder: Path, reading: ImageReading, camera: str, place: dict
+) -> str:
+    """Why a camera stops the take: it has no images, or of a kind that is not read; else empty."""
+    if paths:
+        return refusal(next(iter(paths.values())), reading, camera=camera, **place)
+    return describe_problem(
+        "no image",
+        "numbered frames of every camera of the rig",
+        "Add the camera's frames, or take it out of the rig.",
+        camera=camera,
+        path=folder,
+        **place,
+    )
 
 
 def _check_camera(
@@ -135,24 +160,25 @@ def _check_camera(
     frames: Sequence[int],
     sizes: dict[str, tuple[int, int]],
     source: Path,
+    reading: ImageReading = AS_TAGGED,
 ) -> list[str]:
     """Check one camera's images of the chunk, filling the manifest; returns fatal problems."""
     expected = sizes.get(camera)
     calibrated = expected is not None
     if not calibrated:
-        known = [header_size(path) for path in paths.values()]
+        known = [header_size(path, reading) for path in paths.values()]
         common = Counter(size for size in known if size is not None).most_common(1)
         expected = common[0][0] if common else None
     facts, bad = {}, {}
     for frame in progress(frames, f"{manifest.subject}/{manifest.take} {camera}"):
-        found, reason = check_image(paths.get(frame, source / "missing"), source, expected)
+        found, reason = check_image(paths.get(frame, source / "missing"), source, expected, reading)
         if found is not None:
             facts[frame] = found.as_dict()
         if reason:
             bad[frame] = reason
-    if calibrated and len(bad) == len(frames) and _none_fits(paths, expected):
+    if calibrated and len(bad) == len(frames) and _none_fits(paths, expected, reading):
         width, height = expected
-        found = Counter(header_size(path) for path in paths.values()).most_common(1)
+        found = Counter(header_size(path, reading) for path in paths.values()).most_common(1)
         return [
             describe_problem(
                 f"images of {_times(found[0][0])}",
@@ -177,8 +203,8 @@ def _check_camera(
     return []
 
 
-def _none_fits(paths: dict[int, Path], expected: tuple[int, int]) -> bool:
-    return not any(header_size(path) == expected for path in paths.values())
+def _none_fits(paths: dict[int, Path], expected: tuple[int, int], reading: ImageReading) -> bool:
+    return not any(header_size(path, reading) == expected for path in paths.values())
 
 
 def _times(size: tuple[int, int] | None) -> str:
@@ -187,9 +213,10 @@ def _times(size: tuple[int, int] | None) -> str:
 
 def _calibrated_sizes(source: Path) -> dict[str, tuple[int, int]]:
     """Camera -> (width, height) where the capture brings its calibration."""
-    if not (source / "cameras").is_dir():
+    folder = folder_of(source, "cameras")
+    if not folder.is_dir():
         return {}
-    cameras = read_cameras(source / "cameras")
+    cameras = read_cameras(folder)
     return {name: (camera.width_px, camera.height_px) for name, camera in cameras.items()}
 
 
@@ -200,10 +227,9 @@ def _video_manifest(
     frames: Sequence[int],
     cameras: Sequence[str] | None,
     hash_decoded: bool,
+    facts: VideoFacts,
 ) -> Manifest:
-    import hashlib
-
-    reader = VideoReader(source)
+    reader = VideoReader(source, facts.index)
     place = {"subject": subject, "take": take}
     camera = cameras[0] if cameras else "cam"
     width, height = reader.size
@@ -212,19 +238,12 @@ def _video_manifest(
         try:
             pixels = reader.read(frame, camera=camera, **place)
         except InputError as error:
-            bad[frame] = _short(error)
+            bad[frame] = error.brief
             continue
         if pixels.shape[:2] != (height, width):
             bad[frame] = f"size {pixels.shape[1]}x{pixels.shape[0]}, expected {width}x{height}"
         if hash_decoded:
             decoded[frame] = {"sha256_rgb8": hashlib.sha256(pixels.tobytes()).hexdigest()}
-    facts = {
-        "file": source.name,
-        "size_bytes": source.stat().st_size,
-        "sha256": sha256_of(source),
-        "frames": reader.n_frames,
-        "fps": reader.fps,
-    }
     size = {"width_px": width, "height_px": height, "channels": 3, "bits": 8}
     return Manifest(
         subject,
@@ -234,13 +253,8 @@ def _video_manifest(
         {camera: size},
         {camera: decoded} if decoded else {},
         {camera: bad} if bad else {},
-        facts,
+        facts.summary(),
     )
-
-
-def _short(error: InputError) -> str:
-    """The part of a message after its place."""
-    return str(error).split("found ", 1)[-1].split(";", 1)[0]
 
 
 def _fatal(problems: list[str], source: Path, place: dict) -> InputError:
@@ -259,12 +273,14 @@ def quality_rows(
 ) -> list[QualityRow]:
     """A row a frame: invalid without a `needed` camera or without half of the cameras.
 
-    A frame that lacks some other image is valid but names it in its reason.
+    A frame that lacks some other image is valid but names it in its reason; the first frame names
+    what the manifest warns of.
     """
     rows = []
     for frame in frames:
         lacking = {c: reasons[frame] for c, reasons in manifest.bad.items() if frame in reasons}
-        reason = "; ".join(f"{camera}: {why}" for camera, why in sorted(lacking.items()))
+        reasons = [f"{camera}: {why}" for camera, why in sorted(lacking.items())]
+        reason = "; ".join([*reasons, *(manifest.warnings if frame == frames[0] else [])])
         usable = len(manifest.cameras) - len(lacking)
         valid = not (set(lacking) & set(needed)) and usable > 0
         valid = valid and 2 * usable > len(manifest.cameras)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from vermilion.capture.manifest import Manifest
 from vermilion.geometry.camera import Camera, pinhole, read_cameras
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.images import IMAGE_SUFFIXES, read_image
+from vermilion.imaging.source import Source, folder_of, is_video
 from vermilion.storage.errors import InputError, describe_problem
 from vermilion.storage.progress import progress
 
@@ -67,7 +68,7 @@ def image_sizes(manifests: Sequence[Manifest]) -> dict[str, tuple[int, int]]:
 
 
 def rig_cameras(
-    source: str | Path,
+    source: Source,
     sizes: dict[str, tuple[int, int]],
     reference: str,
     board: Board,
@@ -87,13 +88,16 @@ def rig_cameras(
 
     Raises InputError where several cameras have neither, or the given ones do not fit the images.
     """
-    source = Path(source)
-    if (source / "cameras").is_dir():
-        cameras = read_cameras(source / "cameras")
-        _check_given(cameras, sizes, source, place)
+    given, calibration = folder_of(source, "cameras"), folder_of(source, "calibration")
+    if given.is_dir():
+        cameras = read_cameras(given)
+        if is_video(source) and len(cameras) == len(sizes) == 1:  # a video's camera has no name
+            name, (camera,) = next(iter(sizes)), cameras.values()
+            cameras = {name: replace(camera, name=name)}
+        _check_given(cameras, sizes, given, place)
         return RigCameras({name: cameras[name] for name in sizes}, "given")
-    if (source / "calibration").is_dir():
-        seen = detect_boards(source / "calibration", board, sizes, place)
+    if calibration.is_dir():
+        seen = detect_boards(calibration, board, sizes, place)
         if reference not in sizes:
             reference = min(sizes)
         made = calibrate_rig(
@@ -107,7 +111,7 @@ def rig_cameras(
         f"{len(sizes)} cameras without a calibration",
         "cameras/ (a COLMAP text model) or calibration/<camera>/ (views of a board)",
         "Export the rig as COLMAP text, or add ChArUco or checkerboard images.",
-        path=source,
+        path=given.parent,
         **place,
     )
 
@@ -157,12 +161,12 @@ def detect_boards(
 
 
 def _check_given(
-    cameras: dict[str, Camera], sizes: dict[str, tuple[int, int]], source: Path, place: dict
+    cameras: dict[str, Camera], sizes: dict[str, tuple[int, int]], folder: Path, place: dict
 ) -> None:
     problems = []
     for name, (width, height) in sizes.items():
         if name not in cameras:
-            problems.append(f"camera {name} is not in images.txt")
+            problems.append(f"camera {name} is not in the model")
         elif (cameras[name].width_px, cameras[name].height_px) != (width, height):
             given = cameras[name]
             problems.append(
@@ -174,6 +178,6 @@ def _check_given(
             "; ".join(problems),
             "a calibration of every camera at the size of its images",
             "Correct cameras/, or export the frames at the calibrated size.",
-            path=source / "cameras",
+            path=folder,
             **place,
         )

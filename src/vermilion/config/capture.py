@@ -7,6 +7,8 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from vermilion.config.base import StageConfig
+from vermilion.imaging.colour_space import check_colour_space
+from vermilion.imaging.images import ImageReading
 
 
 class ManifestConfig(StageConfig):
@@ -207,6 +209,17 @@ class CaptureConfig(StageConfig):
         description="Camera of a multi-view take that stands for the monocular video; the world of a "
         "rig calibrated here is its frame.",
     )
+    exr_layer: str = Field(
+        "",
+        description="Name of the layer that is the image, in EXR files of several layers (`beauty` of "
+        "`beauty.R`); files of one layer are read as they are.",
+    )
+    colour_space: str = Field(
+        "",
+        description="Name of the colour space of the captures' image files, as OpenColorIO's built-in "
+        "studio configuration has it (`ACEScg`, `ARRI LogC3 (EI800)`, ...); by default sRGB, and linear "
+        "sRGB for EXR and HDR. Videos are read by their tags.",
+    )
     manifest: ManifestConfig = Field(
         default_factory=ManifestConfig, description="What is recorded of the images."
     )
@@ -216,3 +229,15 @@ class CaptureConfig(StageConfig):
     refinement: RefinementConfig = Field(
         default_factory=RefinementConfig, description="Refinement of the cameras' poses."
     )
+
+    @field_validator("colour_space")
+    @classmethod
+    def _known_colour_space(cls, name: str) -> str:
+        if name:
+            check_colour_space(name)
+        return name
+
+    @property
+    def reading(self) -> ImageReading:
+        """How image files of captures are read."""
+        return ImageReading(self.exr_layer, self.colour_space)

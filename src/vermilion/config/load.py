@@ -11,8 +11,10 @@ from vermilion.config.moved import moved_keys, new_key
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.imaging.frames import list_frames
-from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
-from vermilion.storage.errors import ConfigurationError, VermilionError
+from vermilion.imaging.images import AS_TAGGED, IMAGE_SUFFIXES, ImageReading, refusal
+from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
+from vermilion.imaging.video import VideoReader
+from vermilion.storage.errors import ConfigurationError, InputError, VermilionError
 
 
 def load_configuration(
@@ -45,16 +47,20 @@ def load_configuration(
     if configuration is not None:
         problems += _cross_checks(configuration, takes, origin)
     if check_disk:
+        reading = AS_TAGGED if configuration is None else configuration.capture.reading
         for take in takes:
-            problems += [f"{sheet}, take {take.name}: {p}" for p in check_source(take)]
+            problems += [f"{sheet}, take {take.name}: {p}" for p in check_source(take, reading)]
     if problems:
         raise ConfigurationError(problems)
     assert configuration is not None
     return configuration, takes
 
 
-def check_source(take: Take) -> list[str]:
-    """What is wrong with the source of a take on disk."""
+def check_source(take: Take, reading: ImageReading = AS_TAGGED) -> list[str]:
+    """What is wrong with the source of a take on disk.
+
+    Headers alone are read: of a video, and of the first image of each camera.
+    """
     if take.source == STUDIO or take.role == "tracked":
         return []
     source = Path(take.source)
@@ -65,10 +71,14 @@ def check_source(take: Take) -> list[str]:
             "video. Correct the path (relative to the folder where the workflow starts)."
         ]
     if source.is_file():
-        if source.suffix.lower() not in VIDEO_SUFFIXES:
-            return [f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES)}."]
+        if not is_video(source):
+            return [
+                f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES)}. Convert "
+                f"it: `ffmpeg -i {source.name} -crf 12 {source.stem}.mp4`."
+            ]
         try:
-            count = VideoReader(source).n_frames
+            reader = VideoReader(source)
+            count, _ = reader.n_frames, reader.size
         except VermilionError as error:
             return [str(error)]
         if take.last >= count:
@@ -80,16 +90,36 @@ def check_source(take: Take) -> list[str]:
     folders = sorted(p for p in (source / "frames").glob("*") if p.is_dir()) or [source]
     problems = []
     for folder in folders:
-        present = list_frames(folder)
+        try:
+            present = list_frames(folder)
+        except InputError as error:
+            problems.append(str(error))
+            continue
+        problems += _refused(present, take, reading)
         missing = [f for f in take.frames if f not in present]
         # A camera may miss frames (they are flagged later); a take may not lie outside the disk.
         if len(missing) == len(take.frames) or take.last > max(present, default=-1):
-            span = f"{min(present)} to {max(present)}" if present else "none"
+            span = f"{min(present)} to {max(present)}" if present else f"none{_others(folder)}"
             problems.append(
                 f"source: found frames {span} in '{folder}'; expected {wanted}. Correct "
                 "`first` and `last`, or export the frames."
             )
     return problems
+
+
+def _others(folder: Path) -> str:
+    """What lies in a folder in place of images that are read, for a message."""
+    found = sorted({p.suffix.lower() for p in folder.iterdir() if p.is_file() and p.suffix})
+    return f" (files of {', '.join(found)}; read are {', '.join(IMAGE_SUFFIXES)})" if found else ""
+
+
+def _refused(present: dict[int, Path], take: Take, reading: ImageReading) -> list[str]:
+    """Why the first image of a take is of a kind that is not read; damaged ones are flagged later."""
+    first = next((path for frame, path in present.items() if frame in take.frames), None)
+    if first is None:
+        return []
+    reason = refusal(first, reading)
+    return [reason] if reason else []
 
 
 def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) -> list[str]:

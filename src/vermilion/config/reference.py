@@ -30,7 +30,7 @@ def generated_files() -> dict[str, str]:
 def take_sheet_schema() -> dict[str, Any]:
     """JSON schema of one row of the take sheet."""
     name = {"type": "string", "pattern": "^[A-Za-z0-9_.]+$"}
-    whole = {"type": "integer", "minimum": 0}
+    whole = {"anyOf": [{"type": "integer", "minimum": 0}, {"const": ""}]}
     properties = {
         "subject": {**name, "description": "Name of the person."},
         "take": {**name, "description": "Name of the take; unique for the subject."},
@@ -39,8 +39,11 @@ def take_sheet_schema() -> dict[str, Any]:
             "type": "string",
             "description": "Capture folder, frame folder or video; `studio` for a synthetic one.",
         },
-        "first": {**whole, "description": "First frame: the neutral, mouth slightly open."},
-        "last": {**whole, "description": "Last frame, included."},
+        "first": {
+            **whole,
+            "description": "First frame: the neutral, mouth slightly open. Empty: the first of the source.",
+        },
+        "last": {**whole, "description": "Last frame, included. Empty: the last of the source."},
         "fps": {"type": "number", "exclusiveMinimum": 0, "description": "Frames a second."},
         "split": {
             "type": "string",

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from vermilion.config.frame_range import frame_range
+from vermilion.storage.errors import InputError
+
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
 #: What a split may be.
@@ -24,7 +27,8 @@ class Take:
         subject, take: names, letters, digits, `_` and `.` only.
         role: `tattoo`, `plain`, `video` or `tracked`.
         source: capture folder, frame folder or video file; `studio` for the embedded default.
-        first, last: frame numbers, both included. The first is the neutral.
+        first, last: frame numbers, both included. The first is the neutral. Left empty in the sheet,
+            they are those of the source on disk.
         fps: frames a second.
         split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
             rest trains).
@@ -117,7 +121,10 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
     if not value["source"]:
         wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
     numbers = {}
+    open_ends = [name for name in ("first", "last") if not value[name]]
     for name, kind in (("first", int), ("last", int), ("fps", float)):
+        if name in open_ends:
+            continue
         try:
             numbers[name] = kind(value[name])
         except ValueError:
@@ -125,6 +132,9 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
                 f"{name}: found '{value[name]}'; expected "
                 f"{'a whole number' if kind is int else 'a number'}."
             )
+    if open_ends and not wrong:
+        numbers, reason = _with_range(value, numbers, open_ends)
+        wrong += [reason] if reason else []
     if {"first", "last"} <= numbers.keys() and not 0 <= numbers["first"] <= numbers["last"]:
         wrong.append(
             f"frames: found {numbers['first']} to {numbers['last']}; expected 0 <= first <= last."
@@ -154,6 +164,23 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         split=split,
         **numbers,
     ), []
+
+
+def _with_range(
+    value: dict[str, str], numbers: dict[str, float], open_ends: list[str]
+) -> tuple[dict[str, float], str]:
+    """The numbers of a row with `first` and `last` of its source; or a sentence why there are none."""
+    place = " and ".join(open_ends)
+    if value["source"] == STUDIO:
+        return numbers, f"{place}: found nothing; expected frame numbers, as the studio makes them."
+    try:
+        first, last = frame_range(value["source"], value["role"])
+    except InputError as error:
+        return numbers, f"{place}: found nothing, and of the source: {error}"
+    found = {"first": first, "last": last, **numbers}
+    if value["role"] == "plain" and "last" in open_ends:
+        found["last"] = found["first"]
+    return found, ""
 
 
 def _check_together(takes: list[Take]) -> list[str]:

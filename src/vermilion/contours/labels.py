@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from vermilion.contours.paths import cheapest_path
+from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
 
 CONTOURS = ("inner", "outer")
@@ -66,9 +67,9 @@ def read_label(path: str | Path, **place) -> ContourLabel:
     return ContourLabel(**lines)
 
 
-def label_paths(capture: str | Path, camera: str) -> dict[int, Path]:
-    """Frame -> label file of one camera of a capture folder; empty where there are none."""
-    folder = Path(capture) / "labels" / "contours" / camera
+def label_paths(capture: Source, camera: str) -> dict[int, Path]:
+    """Frame -> label file of one camera of a capture; empty where there are none."""
+    folder = folder_of(capture, "labels") / "contours" / camera
     return {int(path.stem): path for path in sorted(folder.glob("*.json")) if path.stem.isdigit()}
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pycolmap
 
+from vermilion.geometry.colmap import camera_names, read_model
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 
@@ -164,53 +163,38 @@ def look_at(centre_mm: np.ndarray, target_mm: np.ndarray, up: np.ndarray) -> np.
 
 
 def read_cameras(folder: str | Path) -> dict[str, Camera]:
-    """Cameras of a COLMAP text model, by image name without suffix, sorted by name.
+    """Cameras of a COLMAP model (text or binary, with rigs or without), sorted by name.
 
-    Raises InputError where the folder is no such model.
+    An image is named after its camera (`face0`, `face0.jpg`), or lies in the camera's folder
+    (`face0/000000.jpg`).
+
+    Raises:
+        InputError: the folder holds no such model, or a camera has images of different poses.
     """
-    folder = Path(folder)
-    for name in ("cameras.txt", "images.txt"):
-        if not (folder / name).is_file():
-            raise InputError(
-                f"no {name}",
-                "a COLMAP text model (cameras.txt, images.txt)",
-                "Export the rig as text from COLMAP, or give calibration views.",
-                path=folder,
-            )
-    try:
-        model = pycolmap.Reconstruction()
-        model.read_text(str(folder)) if (folder / "points3D.txt").is_file() else _read_two(
-            model, folder
-        )
-    except Exception as error:  # pycolmap raises several kinds
-        raise InputError(
-            f"a COLMAP model that cannot be read ({error})",
-            "valid cameras.txt and images.txt",
-            "Check the files' columns against the COLMAP documentation.",
-            path=folder,
-        ) from error
-    cameras = {}
-    for image in model.images.values():
-        name = Path(image.name).stem
+    model = read_model(folder)
+    images = {image.name: image for image in model.images.values()}
+    cameras: dict[str, Camera] = {}
+    for image_name, name in sorted(camera_names(images).items()):
+        image = images[image_name]
         camera = model.cameras[image.camera_id]
         pose = np.asarray(image.cam_from_world().matrix())
-        cameras[name] = Camera(
+        found = Camera(
             name, camera.model_name, tuple(camera.params), camera.width, camera.height, pose
         )
+        if name in cameras and not np.allclose(cameras[name].cam_from_world, pose, atol=1e-6):
+            raise InputError(
+                f"images of camera {name} with different poses ('{image_name}' is one)",
+                "one pose a camera: the rig does not move during a take",
+                "Leave one image of each camera in the model.",
+                camera=name,
+                path=folder,
+            )
+        cameras.setdefault(name, found)
     if not cameras:
         raise InputError(
-            "no image in images.txt", "one image a camera", "Add a pose a camera.", path=folder
+            "no image in the model", "one image a camera", "Add a pose a camera.", path=folder
         )
     return dict(sorted(cameras.items()))
-
-
-def _read_two(model: pycolmap.Reconstruction, folder: Path) -> None:
-    """Read a model whose points3D.txt is absent, as exporters leave it out."""
-    with tempfile.TemporaryDirectory() as copy:
-        for name in ("cameras.txt", "images.txt"):
-            shutil.copy(folder / name, copy)
-        (Path(copy) / "points3D.txt").touch()
-        model.read_text(copy)
 
 
 def write_cameras(folder: str | Path, cameras: dict[str, Camera]) -> None:

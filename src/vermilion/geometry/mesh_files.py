@@ -10,6 +10,8 @@ from vermilion.geometry.mesh import Mesh
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 
+MESH_SUFFIXES = (".obj", ".ply")
+
 
 def write_ply(path: str | Path, mesh: Mesh, colours: np.ndarray | None = None) -> None:
     """Write a binary PLY; `colours` (V, 3) uint8 optional."""

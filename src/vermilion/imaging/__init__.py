@@ -1,1 +1,1 @@
-"""Images and video, read and written; colour, sampling, drawing."""
+"""What a file's tags say about its images, and how they become plain sRGB or linear images."""

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from vermilion.imaging.images import IMAGE_SUFFIXES, image_size, read_image, srgb_to_linear
-from vermilion.imaging.video import VIDEO_SUFFIXES, VideoReader
+from vermilion.imaging.images import (
+    AS_TAGGED,
+    IMAGE_SUFFIXES,
+    ImageReading,
+    image_size,
+    read_image,
+    srgb_to_linear,
+)
+from vermilion.imaging.numbering import numbered_files
+from vermilion.imaging.source import VIDEO_SUFFIXES, Source, is_video, source_path
+from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
 
 
@@ -27,8 +35,14 @@ class FrameSource(Protocol):
 class FolderFrames:
     """`<folder>/<frame>.<suffix>`, in one folder or several chunks; the camera is ignored."""
 
-    def __init__(self, folders: Sequence[str | Path], subject: str = "", take: str = ""):
-        self.subject, self.take = subject, take
+    def __init__(
+        self,
+        folders: Sequence[str | Path],
+        subject: str = "",
+        take: str = "",
+        reading: ImageReading = AS_TAGGED,
+    ):
+        self.subject, self.take, self.reading = subject, take, reading
         self._paths: dict[int, Path] = {}
         self.folders = [Path(folder) for folder in folders]
         for folder in self.folders:
@@ -44,21 +58,28 @@ class FolderFrames:
                 path=self.folders[0],
                 **place,
             )
-        return read_image(self._paths[frame], **place)
+        return read_image(self._paths[frame], self.reading, **place)
 
     def size(self, camera: str) -> tuple[int, int]:
         if not self._paths:
             raise InputError(
                 "no images", "numbered images", "Check the folder.", path=self.folders[0]
             )
-        return image_size(self._paths[min(self._paths)], camera=camera)
+        return image_size(self._paths[min(self._paths)], self.reading, camera=camera)
 
 
 class CaptureFrames:
     """`<capture>/frames/<camera>/<frame>.<suffix>`."""
 
-    def __init__(self, capture: str | Path, subject: str = "", take: str = ""):
+    def __init__(
+        self,
+        capture: str | Path,
+        subject: str = "",
+        take: str = "",
+        reading: ImageReading = AS_TAGGED,
+    ):
         self.capture, self.subject, self.take = Path(capture), subject, take
+        self.reading = reading
         self._cameras: dict[str, FolderFrames] = {}
 
     def _camera(self, camera: str) -> FolderFrames:
@@ -74,7 +95,7 @@ class CaptureFrames:
                     camera=camera,
                     path=folder,
                 )
-            self._cameras[camera] = FolderFrames([folder], self.subject, self.take)
+            self._cameras[camera] = FolderFrames([folder], self.subject, self.take, self.reading)
         return self._cameras[camera]
 
     def read(self, camera: str, frame: int) -> np.ndarray:
@@ -104,18 +125,21 @@ class VideoFrames:
 
 
 def open_frames(
-    source: str | Path | Sequence[str | Path], subject: str = "", take: str = ""
+    source: Source | Sequence[str | Path], subject: str = "", take: str = ""
 ) -> FrameSource:
-    """Open a capture folder, a folder (or several) of numbered frames, or a video file."""
-    if not isinstance(source, str | Path):
+    """Open a capture folder, a folder (or several) of numbered frames, or a video file.
+
+    A mapping (see `imaging.source`) also says how image files are read.
+    """
+    if not isinstance(source, str | Path | Mapping):
         return FolderFrames(source, subject, take)
-    path = Path(source)
-    if path.suffix.lower() in VIDEO_SUFFIXES:
+    path, reading = source_path(source), reading_of(source)
+    if is_video(path):
         return VideoFrames(path, subject, take)
     if (path / "frames").is_dir():
-        return CaptureFrames(path, subject, take)
+        return CaptureFrames(path, subject, take, reading)
     if path.is_dir():
-        return FolderFrames([path], subject, take)
+        return FolderFrames([path], subject, take, reading)
     raise InputError(
         "neither a folder nor a video",
         f"a capture folder, a folder of frames, or one of {', '.join(VIDEO_SUFFIXES)}",
@@ -126,11 +150,16 @@ def open_frames(
     )
 
 
+def reading_of(source: Source) -> ImageReading:
+    """How the image files of a source are read."""
+    if not isinstance(source, Mapping):
+        return AS_TAGGED
+    return ImageReading(source.get("exr_layer", ""), source.get("colour_space", ""))
+
+
 def list_frames(folder: str | Path) -> dict[int, Path]:
-    """Frame number -> file of a folder of numbered images, in order of number."""
-    paths = {}
-    for path in sorted(Path(folder).glob("*")):
-        number = re.fullmatch(r"(?:.*[._-])?(\d+)", path.stem)
-        if number and path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith("."):
-            paths[int(number.group(1))] = path
-    return dict(sorted(paths.items()))
+    """Frame number -> file of a folder of numbered images, in order of number.
+
+    Raises InputError where the folder holds two sequences, or two files of one number.
+    """
+    return numbered_files(folder, IMAGE_SUFFIXES)

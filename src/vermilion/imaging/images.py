@@ -2,16 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
 
-from vermilion.storage.errors import InputError
+from vermilion.imaging.colour_space import to_linear
+from vermilion.imaging.display_window import display_size, to_display_window
+from vermilion.imaging.exr_layers import choose_layer, layers_of
+from vermilion.imaging.orientation import Orientation, orientation_of_exif
+from vermilion.imaging.pixel_aspect import resample, square_size
+from vermilion.storage.errors import InputError, RefusedInputError
 from vermilion.storage.files import atomic_path
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr")
+_EXR = ".exr"
+#: Formats whose pixel aspect is one of the image, not of a sheet of paper.
+_WITH_ASPECT = (_EXR, ".dpx")
+IMAGE_SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr"),
+    *(".dpx", ".bmp", ".tga", ".webp"),
+)
+#: Transfers of DPX that are no display values.
+_FILM_TRANSFERS = ("Printing density", "Logarithmic", "Linear")
+
+
+@dataclass(frozen=True)
+class ImageReading:
+    """What a file does not say of itself.
+
+    Attributes:
+        exr_layer: name of the layer that is the image, in EXR files of several.
+        colour_space: name of the colour space of the files (see `imaging.colour_space`); by default
+            sRGB, and linear sRGB for EXR and HDR.
+    """
+
+    exr_layer: str = ""
+    colour_space: str = ""
+
+
+AS_TAGGED = ImageReading()
+#: Colours beside an alpha channel are not darkened by it.
+_UNASSOCIATED = oiio.ImageSpec()
+_UNASSOCIATED["oiio:UnassociatedAlpha"] = 1
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
@@ -22,6 +56,12 @@ def srgb_to_linear(values: np.ndarray) -> np.ndarray:
     ).astype(np.float32)
 
 
+#: Value of a byte's step as OpenImageIO has it, and linear value of each byte: a look-up costs a
+#: fifth of the curve.
+_BYTE = np.float32(1.0 / 255.0)
+_LINEAR_OF_BYTE = srgb_to_linear(np.arange(256, dtype=np.float32) * _BYTE)
+
+
 def linear_to_srgb(values: np.ndarray) -> np.ndarray:
     """IEC 61966-2-1, clipped to [0, 1], float32."""
     values = np.clip(np.asarray(values, dtype=np.float32), 0.0, 1.0)
@@ -30,17 +70,23 @@ def linear_to_srgb(values: np.ndarray) -> np.ndarray:
     ).astype(np.float32)
 
 
-def read_image(path: str | Path, **place) -> np.ndarray:
+def read_image(path: str | Path, reading: ImageReading = AS_TAGGED, **place) -> np.ndarray:
     """An image as linear RGB, (h, w, 3) float32, whatever its format.
 
-    8 and 16 bit files are taken as sRGB; EXR and HDR as linear. Raises InputError with the
-    `place` (subject, take, camera, frame) where it cannot be read whole.
+    It is upright (EXIF orientation), has square pixels, and for EXR is the display window. Grey
+    becomes three equal channels; alpha is left out. 8 and 16 bit files are taken as sRGB; EXR and
+    HDR as linear. Raises InputError with the `place` (subject, take, camera, frame) where it cannot
+    be read whole, or says that it is something else.
     """
     path = Path(path)
-    pixels = _read_pixels(path, place)
-    if path.suffix.lower() not in LINEAR_SUFFIXES:
-        pixels = srgb_to_linear(pixels)
-    return pixels
+    pixels = _read_pixels(path, reading, place)
+    if reading.colour_space:
+        if pixels.dtype == np.uint8:
+            pixels = pixels * _BYTE
+        return to_linear(pixels, reading.colour_space)
+    if pixels.dtype == np.uint8:
+        return _LINEAR_OF_BYTE[pixels]
+    return pixels if path.suffix.lower() in LINEAR_SUFFIXES else srgb_to_linear(pixels)
 
 
 def read_channels(path: str | Path, **place) -> dict[str, np.ndarray]:
@@ -56,12 +102,34 @@ def read_channels(path: str | Path, **place) -> dict[str, np.ndarray]:
     return {name: pixels[..., index] for index, name in enumerate(names)}
 
 
-def image_size(path: str | Path, **place) -> tuple[int, int]:
-    """(width, height) from the header alone."""
-    stream = _open(Path(path), place)
+def image_size(path: str | Path, reading: ImageReading = AS_TAGGED, **place) -> tuple[int, int]:
+    """(width, height) as `read_image` gives it, from the header alone."""
+    path = Path(path)
+    stream = _open(path, place)
+    try:
+        return shown_size(stream, path, reading, **place)
+    finally:
+        stream.close()
+
+
+def shown_size(
+    stream: oiio.ImageInput, path: Path, reading: ImageReading = AS_TAGGED, **place
+) -> tuple[int, int]:
+    """(width, height) of an open file as `read_image` gives it; the stream is at the image's part."""
+    _seek_image(stream, path, reading, place)
     spec = stream.spec()
-    stream.close()
-    return spec.width, spec.height
+    return _orientation(spec).size(*_square(path, spec, place))
+
+
+def refusal(path: Path, reading: ImageReading = AS_TAGGED, **place) -> str:
+    """Why a file that is whole is of a kind that is not read; empty where it is, or is damaged."""
+    try:
+        image_size(path, reading, **place)
+    except RefusedInputError as error:
+        return str(error)
+    except InputError:
+        pass
+    return ""
 
 
 def write_image(path: str | Path, linear: np.ndarray) -> None:
@@ -116,11 +184,11 @@ def _open(path: Path, place: dict) -> oiio.ImageInput:
             path=path,
             **place,
         )
-    stream = oiio.ImageInput.open(str(path))
+    stream = oiio.ImageInput.open(str(path), _UNASSOCIATED)
     if not stream:
         raise InputError(
             f"a file that is no readable image ({oiio.geterror()})",
-            "PNG, JPEG, TIFF or EXR",
+            "PNG, JPEG, TIFF, EXR or DPX",
             "Export the frame again.",
             path=path,
             **place,
@@ -128,18 +196,74 @@ def _open(path: Path, place: dict) -> oiio.ImageInput:
     return stream
 
 
-def _read_pixels(path: Path, place: dict) -> np.ndarray:
+def _read_pixels(path: Path, reading: ImageReading, place: dict) -> np.ndarray:
+    """Values (h, w, 3) as stored, laid out as shown: uint8, or float32 for other depths."""
     stream = _open(path, place)
+    channels = _seek_image(stream, path, reading, place)
     spec = stream.spec()
-    pixels = stream.read_image(oiio.FLOAT)
+    kind = oiio.UINT8 if spec.format == oiio.UINT8 else oiio.FLOAT
+    pixels = stream.read_image(kind)
     failed = stream.has_error
     stream.close()
     if pixels is None or failed:
         raise _damaged(path, place)
-    pixels = np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, -1)
-    if pixels.shape[2] == 1:
-        return np.repeat(pixels, 3, axis=2)
-    return np.ascontiguousarray(pixels[..., :3])
+    pixels = np.asarray(pixels).reshape(spec.height, spec.width, -1)
+    if channels is not None:
+        pixels = pixels[..., channels]
+    if pixels.shape[2] < 3:  # grey, with alpha or without
+        pixels = np.repeat(pixels[..., :1], 3, axis=2)
+    pixels = np.ascontiguousarray(pixels[..., :3])
+    if path.suffix.lower() == _EXR:
+        pixels = to_display_window(pixels, spec)
+    return _orientation(spec).apply(resample(pixels, _square(path, spec, place)))
+
+
+def _seek_image(
+    stream: oiio.ImageInput, path: Path, reading: ImageReading, place: dict
+) -> list[int] | None:
+    """Go to the part of the file that is the image; its channels, None for the first ones.
+
+    Raises InputError where the file says that it is no image as those that are read here.
+    """
+    if path.suffix.lower() == _EXR:
+        layer = choose_layer(layers_of(stream), reading.exr_layer, path, **place)
+        stream.seek_subimage(layer.part, 0)
+        first = tuple(range(len(layer.indices)))  # a slice of them is no copy
+        return None if layer.indices == first else list(layer.indices)
+    transfer = stream.spec().get_string_attribute("dpx:Transfer")
+    if transfer in _FILM_TRANSFERS and not reading.colour_space:
+        raise RefusedInputError(
+            f"a DPX of {transfer.lower()} values",
+            "display values, or the name of their colour space",
+            "Set `capture.colour_space`, for example to `ADX10` or `ARRI LogC3 (EI800)`, or convert "
+            "the files to sRGB.",
+            path=path,
+            **place,
+        )
+    return None
+
+
+def _orientation(spec: oiio.ImageSpec) -> Orientation:
+    return orientation_of_exif(spec.get_int_attribute("Orientation", 1))
+
+
+def _square(path: Path, spec: oiio.ImageSpec, place: dict) -> tuple[int, int]:
+    """(width, height) with square pixels, not yet turned upright."""
+    width, height = spec.width, spec.height
+    if path.suffix.lower() == _EXR:
+        width, height = display_size(spec)
+    if path.suffix.lower() not in _WITH_ASPECT:
+        return width, height
+    try:
+        return square_size(width, height, spec.get_float_attribute("PixelAspectRatio", 1.0))
+    except ValueError as error:
+        raise RefusedInputError(
+            f"{error}",
+            "pixels up to 4 times as wide as high, or the reverse",
+            "Correct the file's pixel aspect ratio.",
+            path=path,
+            **place,
+        ) from error
 
 
 def _damaged(path: Path, place: dict) -> InputError:

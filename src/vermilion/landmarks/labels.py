@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.imaging.source import Source, folder_of
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
 from vermilion.storage.errors import InputError
 
@@ -22,9 +23,9 @@ class LandmarkLabel:
     points_px: np.ndarray
 
 
-def label_files(capture: str | Path) -> list[Path]:
-    """Label files of a capture folder, sorted by camera and frame."""
-    return sorted((Path(capture) / "labels" / "landmarks").glob("*/*.json"))
+def label_files(capture: Source) -> list[Path]:
+    """Label files of a capture folder or beside a video file, sorted by camera and frame."""
+    return sorted((folder_of(capture, "labels") / "landmarks").glob("*/*.json"))
 
 
 def read_label(path: str | Path) -> LandmarkLabel:
@@ -55,7 +56,7 @@ def read_label(path: str | Path) -> LandmarkLabel:
     return LandmarkLabel(path.parent.name, frame, points)
 
 
-def read_labels(capture: str | Path) -> Iterator[LandmarkLabel]:
+def read_labels(capture: Source) -> Iterator[LandmarkLabel]:
     """All labels of a capture folder."""
     for path in label_files(capture):
         yield read_label(path)

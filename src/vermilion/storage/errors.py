@@ -42,10 +42,19 @@ def describe_problem(
 
 
 class InputError(VermilionError):
-    """A file or value that the user gave cannot be used."""
+    """A file or value that the user gave cannot be used.
+
+    Attributes:
+        brief: what was found, without place and remedy.
+    """
 
     def __init__(self, found: str, expected: str, hint: str, **place):
+        self.brief = found
         super().__init__(describe_problem(found, expected, hint, **place))
+
+
+class RefusedInputError(InputError):
+    """A file that is whole, but of a kind that is not read; the message says how to convert it."""
 
 
 class ConfigurationError(VermilionError):

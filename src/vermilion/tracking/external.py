@@ -5,16 +5,15 @@ A take with role `tracked` brings such a sequence instead of images.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from vermilion.geometry.mesh_files import read_mesh
+from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_mesh
+from vermilion.imaging.numbering import numbered_files
 from vermilion.storage.errors import InputError
 
-MESH_SUFFIXES = (".obj", ".ply")
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -68,11 +67,7 @@ def read_tracked(
 
 
 def _read_folder(folder: Path, frames: list[int], place: dict) -> MeshSequence:
-    paths = {}
-    for path in sorted(folder.iterdir()):
-        number = re.fullmatch(r"(?:.*[._-])?(\d+)", path.stem)
-        if number and path.suffix.lower() in MESH_SUFFIXES:
-            paths[int(number.group(1))] = path
+    paths = numbered_files(folder, MESH_SUFFIXES)
     vertices, triangles = [], None
     for frame in frames:
         if frame not in paths:

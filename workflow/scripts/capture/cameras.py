@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from vermilion.config.capture import CalibrationConfig, RefinementConfig
 from vermilion.geometry.camera import write_cameras
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import read_image, write_srgb8
+from vermilion.imaging.source import folder_of
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 from vermilion.storage.logfile import log_to
@@ -77,7 +77,7 @@ def refinement(cfg, rig, manifest, first, last):
 def overlay(rig, manifest, neutral, made):
     """Points of the refinement, the worst board view of each camera, or the neutral in each."""
     if rig.calibration is not None:
-        folder = Path(manifest.source) / "calibration"
+        folder = folder_of(manifest.source, "calibration")
         moments = {name: worst_view(rig.calibration, name) for name in rig.cameras}
         views = {
             name: {moment: read_image(calibration_views(folder, name)[moment])}

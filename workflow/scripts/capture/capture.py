@@ -2,6 +2,7 @@
 
 from vermilion.capture.manifest import capture_manifest, quality_rows
 from vermilion.capture.overlay import contact_sheet
+from vermilion.capture.video_facts import load_video_facts
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.storage.errors import InputError
@@ -25,6 +26,7 @@ def main(snakemake):
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     frames = snakemake.params.frames
     camera = snakemake.params.camera
+    video = snakemake.input.get("video")
     manifest = capture_manifest(
         snakemake.params.source,
         subject,
@@ -32,7 +34,11 @@ def main(snakemake):
         frames,
         None if snakemake.params.multiview else [camera],
         hash_decoded=snakemake.params.cfg["capture.manifest"]["hash_decoded"],
+        video=load_video_facts(video) if video else None,
+        fps=snakemake.params.fps,
     )
+    for warning in manifest.warnings:
+        print(f"warning: {warning}")
     write_quality(
         snakemake.output.quality, subject, take, "capture", quality_rows(manifest, frames, [camera])
     )

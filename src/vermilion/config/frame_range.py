@@ -1,0 +1,76 @@
+"""First and last frame of a source on disk, for rows of the take sheet that leave them empty."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.geometry.mesh_files import MESH_SUFFIXES
+from vermilion.imaging.frames import list_frames
+from vermilion.imaging.numbering import numbered_files
+from vermilion.imaging.source import is_video
+from vermilion.imaging.video import VideoReader
+from vermilion.storage.errors import InputError
+
+
+def frame_range(source: str | Path, role: str) -> tuple[int, int]:
+    """First and last frame that every camera of a source has.
+
+    Raises:
+        InputError: the source does not tell, or is not there.
+    """
+    source = Path(source)
+    if not source.exists():
+        raise InputError(
+            "no such file or folder",
+            "a source that tells its frames",
+            "Correct the `source`, or give `first` and `last`.",
+            path=source,
+        )
+    if role == "tracked":
+        return _mesh_range(source)
+    if source.is_file():
+        if not is_video(source):
+            raise _silent(source)
+        return 0, VideoReader(source).n_frames - 1
+    cameras = sorted(p for p in (source / "frames").glob("*") if p.is_dir()) or [source]
+    frames = [list_frames(camera) for camera in cameras]
+    if not all(frames):
+        raise _silent(source)
+    first, last = max(min(present) for present in frames), min(max(present) for present in frames)
+    if first > last:
+        raise InputError(
+            "cameras without a frame in common",
+            "frames that all cameras have",
+            "Export them with the numbers of one clock, or give `first` and `last`.",
+            path=source,
+        )
+    return first, last
+
+
+def _mesh_range(source: Path) -> tuple[int, int]:
+    """Frames of a folder of meshes or of an `.npz`."""
+    if source.is_dir():
+        numbers = list(numbered_files(source, MESH_SUFFIXES))
+    elif source.suffix.lower() == ".npz":
+        try:
+            with np.load(source, allow_pickle=False) as data:
+                named = "frames" in data.files
+                numbers = data["frames"].tolist() if named else range(len(data["vertices_mm"]))
+        except (OSError, ValueError, KeyError, EOFError, TypeError) as error:
+            raise _silent(source) from error
+    else:
+        raise _silent(source)
+    if not len(numbers):
+        raise _silent(source)
+    return int(min(numbers)), int(max(numbers))
+
+
+def _silent(source: Path) -> InputError:
+    return InputError(
+        "a source that does not tell its frames",
+        "numbered images or meshes, or a video",
+        "Give `first` and `last`, or correct the `source`.",
+        path=source,
+    )

@@ -1,0 +1,30 @@
+"""The source of a take: a path, alone or with how its image files are to be read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+#: A path, or {"path": ..., "exr_layer": ..., "colour_space": ...}, as parameters of rules carry it.
+Source = str | Path | Mapping[str, str]
+
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
+
+
+def source_path(source: Source) -> Path:
+    """The path of a source."""
+    return Path(source["path"] if isinstance(source, Mapping) else source)
+
+
+def is_video(source: Source) -> bool:
+    """Whether a source is named as a video file."""
+    return source_path(source).suffix.lower() in VIDEO_SUFFIXES
+
+
+def folder_of(source: Source, name: str) -> Path:
+    """Folder `name` (`cameras`, `labels`, `calibration`) of a source.
+
+    `<capture>/labels` of a folder, `clip.mp4.labels` beside a video file.
+    """
+    path = source_path(source)
+    return path.with_name(f"{path.name}.{name}") if is_video(source) else path / name
