@@ -93,7 +93,7 @@ def test_facts_of_a_video_are_found_once_and_kept(tmp_path, monkeypatch):
     assert np.allclose(again.times_s, np.arange(8) / 25)
     whole = capture_manifest(path, "s", "t", [3, 4], ["cam"])
     # With them, the file is neither hashed nor listed again.
-    for name in ("capture.video_facts.sha256_of", "video._list_packets"):
+    for name in ("capture.video_facts.sha256_of", "imaging.video._list_packets"):
         monkeypatch.setattr(f"vermilion.{name}", lambda *_: pytest.fail("read again"))
     assert capture_manifest(path, "s", "t", [3, 4], ["cam"], video=again) == whole
     content = json.loads((tmp_path / "video.json").read_text())
