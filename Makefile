@@ -27,12 +27,10 @@ demo: CONFIG = config/config.yaml
 demo: run
 
 run: $(READY)
-	$(BIN)/snakemake --configfile $(CONFIG) --quiet rules reason host
-	@$(MAKE) --no-print-directory report CONFIG=$(CONFIG)
+	@$(BIN)/python -m vermilion.app.run $(CONFIG) --quiet rules reason host
 
 report: $(READY)
-	@$(BIN)/snakemake --configfile $(CONFIG) --report "$(RESULTS)/report.html" >/dev/null 2>"$(RESULTS)/logs/report.log" || { cat "$(RESULTS)/logs/report.log"; exit 1; }
-	@$(BIN)/python -m vermilion.app.results "$(RESULTS)"
+	@$(BIN)/python -m vermilion.app.run $(CONFIG) --only-report
 
 verify: $(READY)
 	@$(BIN)/python -m vermilion.provenance.checksums "$(RESULTS)"

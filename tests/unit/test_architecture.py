@@ -42,7 +42,7 @@ SHARED_RULES = {"common", "paths", "targets"}
 #: Stages that have no section of their own: what they read belongs to another stage's section.
 WITHOUT_SECTION = {"scan": "tracking.scans", "report": "evaluation.figures"}
 #: Sections that are no stage: names of files and folders.
-PLAIN_KEYS = {"results", "takes", "chunk_frames"}
+PLAIN_KEYS = {"results", "takes", "chunk_frames", "skip_takes"}
 
 
 def name_of(path):

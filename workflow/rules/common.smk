@@ -12,6 +12,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.settings.types import ExecMode
 
 from vermilion.config.load import load_configuration
+from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
 from vermilion.storage.errors import ConfigurationError
 from vermilion.config.regressors import (
@@ -31,6 +32,8 @@ try:
     CONFIG, TAKES = load_configuration(config, ORIGIN, check_disk=IS_MAIN_PROCESS)
 except ConfigurationError as error:
     raise WorkflowError(str(error)) from None
+SKIPPED = [take for take in TAKES if take.name in CONFIG.skip_takes]
+CONFIG, TAKES = without_skipped(CONFIG, TAKES)
 
 SCRIPTS = Path(workflow.basedir) / "workflow" / "scripts"
 

@@ -115,6 +115,15 @@ rule quality:
         runtime=20,
     params:
         code=code_of("report/quality"),
+        skipped=[
+            {
+                "subject": take.subject,
+                "take": take.take,
+                "frame": take.first,
+                "reason": f"the whole take was left out: {CONFIG.skip_takes[take.name]}",
+            }
+            for take in SKIPPED
+        ],
     script:
         "../scripts/report/quality.py"
 

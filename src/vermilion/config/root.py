@@ -40,6 +40,11 @@ class Configuration(StageConfig):
         le=100_000,
         description="Frames a job (frames). Changes no result; 100 locally, 250 to 300 on a cluster.",
     )
+    skip_takes: dict[str, str] = Field(
+        default_factory=dict,
+        description="Takes (subject/take) to leave out -> the reason, which quality.tsv repeats. `make run` "
+        "leaves out takes that fail by itself.",
+    )
     face_model: FaceModelConfig = Field(
         default_factory=FaceModelConfig, description="The face model."
     )

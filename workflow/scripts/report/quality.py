@@ -1,14 +1,19 @@
-"""Every flagged frame of every stage, with the reason."""
+"""Every flagged frame of every stage, with the reason; takes that were left out."""
+
+import pandas as pd
 
 from vermilion.storage.logfile import log_to
-from vermilion.storage.quality import flagged_frames
+from vermilion.storage.quality import COLUMNS, flagged_frames
 from vermilion.storage.tables import write_table
 
 
 def main(snakemake):
     flagged = flagged_frames(snakemake.input.tables)
-    write_table(snakemake.output.flagged, flagged)
-    print(flagged.to_string())
+    rows = [{"stage": "run", "valid": 0, **row} for row in snakemake.params.skipped]
+    left_out = pd.DataFrame(rows, columns=list(COLUMNS))
+    table = pd.concat([left_out, flagged], ignore_index=True) if rows else flagged
+    write_table(snakemake.output.flagged, table)
+    print(table.to_string())
 
 
 if __name__ == "__main__":

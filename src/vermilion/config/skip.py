@@ -1,0 +1,36 @@
+"""Takes that a run leaves out (`skip_takes`), taken out of the sheet and of every list that names them."""
+
+from __future__ import annotations
+
+from vermilion.config.root import Configuration
+from vermilion.config.takes import Take
+
+
+def without_skipped(
+    configuration: Configuration, takes: list[Take]
+) -> tuple[Configuration, list[Take]]:
+    """The configuration and the sheet as if the takes of `skip_takes` had never been named."""
+    skipped = configuration.skip_takes
+    if not skipped:
+        return configuration, takes
+
+    def kept(names: list[str]) -> list[str]:
+        return [name for name in names if name not in skipped]
+
+    neutral = {
+        name: frame
+        for name, frame in configuration.correction.neutral_frames.items()
+        if name not in skipped
+    }
+    detail = configuration.detail
+    relief = detail.relief.model_copy(update={"takes": kept(detail.relief.takes)})
+    sections = {
+        "apply": configuration.apply.model_copy(update={"takes": kept(configuration.apply.takes)}),
+        "correction": configuration.correction.model_copy(update={"neutral_frames": neutral}),
+        "detail": detail.model_copy(update={"takes": kept(detail.takes), "relief": relief}),
+        "landmarks": configuration.landmarks.model_copy(
+            update={"training_takes": kept(configuration.landmarks.training_takes)}
+        ),
+    }
+    rest = [take for take in takes if take.name not in skipped]
+    return configuration.model_copy(update=sections), rest
