@@ -56,7 +56,7 @@ def main() -> None:
         cameras, names, points, confidence, min_confidence=settings.min_confidence,
         max_distance_mm=settings.landmark_distance_mm,
     )  # fmt: skip
-    fitted, _, _ = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
+    fitted = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
     start = deform_to_landmarks(
         fitted, ThinPlate.of(fitted, model.triangles), model.landmarks, landmarks,
         length_mm=settings.landmark_length_mm, sigma_mm=settings.landmark_sigma_mm,

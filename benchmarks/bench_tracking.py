@@ -28,9 +28,10 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.config.refinement import RefinementConfig
 from vermilion.config.tracking import TrackingConfig
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import rigid_alignment, vertex_normals
+from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
@@ -58,13 +59,12 @@ def seen(camera: Camera, vertices: np.ndarray, triangles: np.ndarray, keep: np.n
 
 def first_alignment(source: np.ndarray, target: cKDTree) -> tuple[np.ndarray, np.ndarray]:
     """Rigid motion of points (N, 3) onto a cloud by iterated closest points, 5 % left out."""
-    rotation, translation = np.eye(3), np.zeros(3)
+    found = Similarity(1.0, np.eye(3), np.zeros(3))
     for _ in range(_ROUNDS):
-        moved = source @ rotation.T + translation
-        distance, nearest = target.query(moved)
+        distance, nearest = target.query(found.apply(source))
         near = distance <= np.quantile(distance, 0.95)
-        rotation, translation = rigid_alignment(source[near], target.data[nearest[near]])
-    return rotation, translation
+        found = similarity_alignment(source[near], target.data[nearest[near]], scale=1.0)
+    return found.rotation, found.translation
 
 
 def distances(model, meshes, camera, truth, truth_triangles, truth_face) -> dict[str, float]:

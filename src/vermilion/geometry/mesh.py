@@ -116,23 +116,6 @@ def normalised(vectors: np.ndarray) -> np.ndarray:
     return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=float), where=length > 0)
 
 
-def rigid_alignment(
-    source: np.ndarray, target: np.ndarray, weights: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) that bring `source` (N, 3) onto `target` (N, 3).
-
-    Weighted least squares (Arun et al. 1987): target ~ source @ rotation.T + translation.
-    """
-    weights = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=float)
-    weights = weights / weights.sum()
-    source_mean, target_mean = weights @ source, weights @ target
-    covariance = ((source - source_mean) * weights[:, None]).T @ (target - target_mean)
-    u, _, vt = np.linalg.svd(covariance)
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
-    rotation = vt.T @ flip @ u.T
-    return rotation, target_mean - rotation @ source_mean
-
-
 def mesh_corners(triangles: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Ids of the vertices of the triangles `mask` (M,), ascending."""
     return np.unique(triangles[mask])

@@ -119,7 +119,7 @@ def register_neutral(
             "Check the cameras' calibration, or give landmark labels of the neutral.",
             frame=frame.number,
         )
-    fitted, _, _ = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
+    fitted = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
     plate = ThinPlate.of(fitted, model.triangles)
     start = deform_to_landmarks(
         fitted,

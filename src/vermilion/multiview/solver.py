@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.rotations import nearest_rotation
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 
@@ -58,9 +59,7 @@ class ThinPlate:
         mix = self.adjacency + sparse.eye(n)
         for _ in range(smoothing):
             sums = mix @ sums
-        u, _, vt = np.linalg.svd(sums.reshape(n, 3, 3))
-        u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-        return u @ vt
+        return nearest_rotation(sums.reshape(n, 3, 3))
 
     def missing(self, vertices_mm: np.ndarray) -> np.ndarray:
         """Laplacian (V, 3) that the rest shape, turned locally, has and `vertices_mm` lacks."""
