@@ -91,8 +91,12 @@ def _without_folds(
         points = found.sample(accurate.vertices_mm, accurate.triangles)
         count = np.maximum(ring @ found.bound.astype(float), 1.0)
         middle = (ring @ np.nan_to_num(points)) / count[:, None]
-        wanted = points[moving] + pull[moving, None] * (middle - points[moving])
-        slid = search(moving, wanted, found.sample(normals, accurate.triangles)[moving])
+        step = pull[moving, None] * (middle - points[moving])
+        slid = search(
+            moving, points[moving] + step, found.sample(normals, accurate.triangles)[moving]
+        )
+        # A point that would end farther from its goal than it is now stays.
+        slid = slid.restricted(slid.distance_mm <= np.linalg.norm(step, axis=1))
         triangle, barycentric = found.triangle.copy(), found.barycentric.copy()
         triangle[moving[slid.bound]] = slid.triangle[slid.bound]
         barycentric[moving[slid.bound]] = slid.barycentric[slid.bound]

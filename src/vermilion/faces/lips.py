@@ -39,7 +39,8 @@ def lip_sides_by_distance(
 ) -> np.ndarray:
     """Side of each vertex of the lips and the whole inside of the mouth.
 
-    A vertex belongs to the lip whose vermilion is nearer along the mouth's surface.
+    A vertex belongs to the lip whose vermilion is nearer along the mouth's surface. Where both are
+    as near, the inside is of the lower lip, the vermilion of neither.
 
     Args:
         mesh: the neutral, any frame, mm.
@@ -53,7 +54,8 @@ def lip_sides_by_distance(
     upper, lower = regions["vermilion_upper"], regions["vermilion_lower"]
     if not (upper.any() and lower.any()):
         return upper.astype(np.int8) - lower.astype(np.int8)
-    mouth = upper | lower | regions["mouth_inner"]
+    inside = regions["mouth_inner"]
+    mouth = upper | lower | inside
     edges = unique_edges(mesh.triangles)
     edges = edges[mouth[edges].all(axis=1)]
     lengths = np.linalg.norm(mesh.vertices_mm[edges[:, 0]] - mesh.vertices_mm[edges[:, 1]], axis=1)
@@ -62,8 +64,10 @@ def lip_sides_by_distance(
         csgraph.dijkstra(graph, directed=False, indices=np.flatnonzero(lip), min_only=True)
         for lip in (upper, lower)
     )
-    sides = (to_upper + corner_mm < to_lower).astype(np.int8) - (to_lower + corner_mm < to_upper)
-    return np.where(mouth, sides, 0).astype(np.int8)
+    is_upper = to_upper + corner_mm < to_lower
+    is_lower = to_lower + corner_mm < to_upper
+    is_lower |= inside & (to_lower + corner_mm == to_upper) & np.isfinite(to_lower)
+    return np.where(mouth, is_upper.astype(np.int8) - is_lower, 0).astype(np.int8)
 
 
 def triangle_sides(triangles: np.ndarray, sides: np.ndarray) -> np.ndarray:
