@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import cv2
 import numpy as np
 
 from vermilion.geometry.camera import Camera, pinhole
+from vermilion.imaging.sampling import sample_bilinear
 from vermilion.storage.errors import InputError
 
 
@@ -172,11 +172,5 @@ def rectified_image(original: Camera, image: np.ndarray, turned: Camera):
     x = in_original[..., 0] / in_original[..., 2] * ko[0, 0] + ko[0, 2]
     y = in_original[..., 1] / in_original[..., 2] * ko[1, 1] + ko[1, 2]
     where = np.stack([x, y], axis=-1)
-    rectified = cv2.remap(
-        image,
-        (x - 0.5).astype(np.float32),
-        (y - 0.5).astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-    )
+    rectified = sample_bilinear(image, where, "zero")
     return rectified, original.in_image(where, 1.0) & (in_original[..., 2] > 0)

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
 from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.views import Frame, sample
+from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
 
 
@@ -135,7 +136,7 @@ def follow(
         whole = np.ones(flow.shape[:2], dtype=bool)
         agreement = matcher.agreement(view.normalised, there.normalised, flow, whole)
         missed = matcher.round_trip(flow, matcher.flow(there.normalised, view.normalised))
-        at = sample(np.dstack([flow, agreement, missed]), seen.pixels)
+        at = sample_bilinear(np.dstack([flow, agreement, missed]), seen.pixels)
         weight = np.clip((at[:, 2] - settings.min_agreement) / (1 - settings.min_agreement), 0, 1)
         weight = weight / (1 + (at[:, 3] / (2 * settings.sigma_px)) ** 2)
         weights.append(np.where(seen.visible, weight * np.clip(seen.cosine, 0, 1), 0.0))
