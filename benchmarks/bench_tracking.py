@@ -35,6 +35,7 @@ from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
@@ -137,7 +138,7 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     bending = LayerSettings(**options["offsets"])
     layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
     frames, levels = open_frames(source), len(photometric.iterations)
-    rows = np.unique(np.linspace(0, len(fit.frames) - 1, count).round().astype(int))
+    rows = evenly_spaced(len(fit.frames), count)
     began = time.process_time()
     fit_motion(start.landmark_shape(), start.seen, focal_px(fit.camera), fps, settings)
     base = (time.process_time() - began) / len(fit.frames)

@@ -20,6 +20,7 @@ from vermilion.landmarks.labels import LandmarkLabel
 from vermilion.landmarks.locate import train_locator
 from vermilion.landmarks.scheme import MIRROR, N_LANDMARKS, face_size_px
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.progress import progress
 
 #: A point this far off (face sizes) is half as sure as one in place.
@@ -54,7 +55,7 @@ def labelled_images(
             "at least ten, better a hundred",
             "Add files to labels/landmarks/<camera>/ of the takes in landmarks.training_takes.",
         )
-    chosen = np.unique(np.linspace(0, len(labels) - 1, max_frames).round().astype(int))
+    chosen = evenly_spaced(len(labels), max_frames)
     images, points = [], []
     for index in chosen:
         source, label = labels[index]
