@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numba
 import numpy as np
@@ -66,7 +67,6 @@ class Surface:
             N points with their distance_mm.
         """
         points = np.ascontiguousarray(points_mm, dtype=np.float64)
-        conditional = normals is not None or sides is not None
         given = np.zeros((len(points), 3)) if normals is None else np.asarray(normals, float)
         cosine = -2.0 if normals is None else min_cosine
         wanted = np.zeros(len(points), np.int64) if sides is None else np.asarray(sides, np.int64)
@@ -74,8 +74,7 @@ class Surface:
         if triangle_sides is not None:
             owned = np.asarray(triangle_sides, np.int64)[self.ids]
         best = np.full(len(points), np.inf)
-        triangle = np.full(len(points), -1, np.int64)
-        barycentric = np.zeros((len(points), 3))
+        triangle, barycentric = np.full(len(points), -1, np.int64), np.zeros((len(points), 3))
 
         def search(group: tuple, rows: np.ndarray, k: int) -> np.ndarray:
             """Try the k candidates of each row; returns the distance to the farthest centroid."""
@@ -88,24 +87,31 @@ class Surface:
             )  # fmt: skip
             return far.reshape(len(rows), k)[:, -1]
 
-        # First a good bound from few candidates of every size, then what could be nearer still.
-        everything = np.arange(len(points))
-        start = [
-            min(_CONDITIONAL_CANDIDATES if conditional else _FIRST_CANDIDATES, len(group[0]))
-            for group in self._groups
-        ]
+        if normals is not None or sides is not None:
+            for group in self._groups:
+                search(group, np.arange(len(points)), min(_CONDITIONAL_CANDIDATES, len(group[0])))
+        else:
+            self._search_exactly(search, best)
+        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
+        return SurfacePoints(triangle, barycentric, best)
+
+    def _search_exactly(self, search: Callable, best: np.ndarray) -> None:
+        """First a good bound from few candidates of every size, then what could be nearer still.
+
+        `best` (N,) holds the distances that `search` has found.
+        """
+        everything = np.arange(len(best))
+        start = [min(_FIRST_CANDIDATES, len(group[0])) for group in self._groups]
         reached = [search(g, everything, k) for g, k in zip(self._groups, start, strict=True)]
         for group, k, far in zip(self._groups, start, reached, strict=True):
             rows = everything
-            while not conditional and k < len(group[0]):
+            while k < len(group[0]):
                 open_rows = far < best[rows] + group[2]
                 rows = rows[open_rows]
                 if not len(rows):
                     break
                 k = min(3 * k, len(group[0]))
                 far = search(group, rows, k)
-        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
-        return SurfacePoints(triangle, barycentric, best)
 
 
 @numba.njit(cache=True)

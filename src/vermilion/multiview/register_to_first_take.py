@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from vermilion.geometry.alignment import similarity_alignment
-from vermilion.multiview.neutral import Neutral
-from vermilion.multiview.take import Refiner, skin_of
+from vermilion.multiview.neutral import Neutral, skin_of
+from vermilion.multiview.take import Refiner
 from vermilion.multiview.views import Frame
 
 

@@ -13,7 +13,13 @@ import numpy as np
 
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
-from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
+from vermilion.multiview.motion import (
+    Measurements,
+    Reference,
+    SolveSettings,
+    see_all,
+    solve_motion,
+)
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
@@ -145,16 +151,13 @@ def follow(
     if not jacobians:  # no camera has both frames
         return vertices_mm
     measured = Measurements(np.array(jacobians), np.array(offsets), np.array(weights))
-    solution = solve_motion(
-        reference.plate,
-        vertices_mm,
-        measured,
+    solve = SolveSettings(
         settings.length_mm,
-        px_per_mm=reference.px_per_mm,
-        sigma_px=settings.sigma_px,
-        max_step_mm=settings.max_step_mm,
+        reference.px_per_mm,
+        settings.sigma_px,
+        settings.max_step_mm,
         keep_shape=False,  # or the pull of every step would add up
         rounds=2,
         tolerance=1e-3,
     )
-    return vertices_mm + solution.step_mm
+    return vertices_mm + solve_motion(reference.plate, vertices_mm, measured, solve).step_mm

@@ -10,9 +10,9 @@ from vermilion.geometry.mesh import unique_edges
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.files import read_neutral, read_track
-from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.storage.files import atomic_path
 from vermilion.storage.frames import evenly_spaced
