@@ -18,10 +18,17 @@ EYES = np.arange(36, 48)
 def back_project(
     points_px: np.ndarray, camera: Camera, mesh: Mesh, max_grazing_deg: float = 70.0
 ) -> SurfacePoints:
-    """Where the rays of pixels (N, 2) meet a mesh in the camera's world.
+    """Where the rays of pixels meet a mesh.
 
-    A point is unbound where its ray misses the mesh or meets it at a grazing angle (more than
-    `max_grazing_deg` off the normal), where a pixel of error is many millimetres on the surface.
+    Args:
+        points_px: (N, 2), NaN where unknown.
+        camera: of the pixels.
+        mesh: in the camera's world, mm.
+        max_grazing_deg: a ray that meets the mesh further off its normal is not used: there a pixel
+            of error is many millimetres on the surface.
+
+    Returns:
+        N points; unbound where a ray misses the mesh or grazes it.
     """
     finite = np.isfinite(points_px).all(axis=1)
     origins, directions = camera.rays(np.where(finite[:, None], points_px, 0.0))

@@ -74,7 +74,7 @@ def aperture_mm(gaps: np.ndarray) -> np.ndarray:
 
 
 def lip_depths(sequence_mm: np.ndarray, model: FaceModel) -> np.ndarray:
-    """How deep one lip lies in the other, (F,) mm, of meshes (F, V, 3); 0 where neither does.
+    """How deep one lip lies in the other, (F,) mm, of sequence_mm (F, V, 3); 0 where neither does.
 
     Away from the corners of the mouth, where the lips are one surface.
     """

@@ -33,7 +33,7 @@ class Regions:
         return (np.stack(list(self.weights.values())) > 0).any(axis=0) | (self.rest > 0)
 
     def restricted(self, valid: np.ndarray) -> Regions:
-        """The regions without the vertices that have no counterpart in the truth."""
+        """The regions of the valid (V,) bool vertices, those with a counterpart in the truth."""
         weights = {name: np.where(valid, w, 0.0) for name, w in self.weights.items()}
         return Regions(weights, np.where(valid, self.rest, 0.0))
 
@@ -44,7 +44,7 @@ def regions_of_mask(
     """Regions of a topology whose mouth mask is given.
 
     Args:
-        model: names the face, the vermilion and the inside of the mouth.
+        model: V vertices; names the face, the vermilion and the inside of the mouth.
         neutral_mm: (V, 3) of the person, for the areas.
         mouth_triangles: triangles of the correction layer, ids or (T,) bool. The inside of the mouth
             does not count, even where the layer covers it: no camera sees it.

@@ -52,14 +52,21 @@ def reference_of(
     neutral_mm: np.ndarray | None = None,
     **place,
 ) -> Reference:
-    """Follow `where` (V points on the surface) through the surface's frames (F, S, 3).
+    """Follow points on a surface through its frames.
 
     The surface is cropped to the surroundings of the points in the first frame: the back of a head
     is no neighbour of a face.
 
     Args:
+        kind: `truth` or `H`.
+        where: V points on the surface.
+        vertices_mm: (F, S, 3) the surface, any world, mm.
+        triangles: (U, 3) of it.
         neutral_mm: (S, 3) the surface at the neutral; None: the first frame is it.
         place: subject and take, for messages.
+
+    Returns:
+        the reference, in the surface's world.
 
     Raises:
         InputError: no vertex has a point on the surface.

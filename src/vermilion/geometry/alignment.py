@@ -22,7 +22,7 @@ class Similarity:
     translation: np.ndarray
 
     def apply(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the source frame in the target frame, (..., 3)."""
+        """The points (..., 3) of the source frame in the target frame, (..., 3)."""
         return self.scale * points @ self.rotation.T + self.translation
 
     def turn(self, vectors: np.ndarray) -> np.ndarray:

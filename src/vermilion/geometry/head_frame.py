@@ -26,5 +26,13 @@ def head_from_world(
 def world_from_head(
     vertices_mm: np.ndarray, rotation: np.ndarray, translation_mm: np.ndarray
 ) -> np.ndarray:
-    """The inverse of `head_from_world`: (F, V, 3) mm head frame -> (F, V, 3) float64 world."""
+    """Meshes of the head frame in the world, the inverse of `head_from_world`.
+
+    Args:
+        vertices_mm: (F, V, 3) in the head frame, mm.
+        rotation, translation_mm: (F, 3, 3), (F, 3) `world_from_head`.
+
+    Returns:
+        (F, V, 3) float64 in the world, mm.
+    """
     return move_frames(vertices_mm, rotation, translation_mm)

@@ -90,11 +90,14 @@ class SurfacePoints:
         )
 
     def corners(self, triangles: np.ndarray) -> np.ndarray:
-        """Vertex ids (N, 3) between which the points lie; those of triangle 0 where unbound."""
+        """Ids (N, 3) of the vertices between which the points lie, by the mesh's triangles (T, 3).
+
+        Those of triangle 0 where unbound.
+        """
         return triangles[np.maximum(self.triangle, 0)]
 
     def vertices(self, triangles: np.ndarray) -> np.ndarray:
-        """Ids, ascending, of the vertices that carry a weight of any point."""
+        """Ids (n,), ascending, of the vertices with a weight in any point, by triangles (T, 3)."""
         carried = self.bound[:, None] & (self.barycentric > 0)
         return np.unique(self.corners(triangles)[carried])
 
@@ -116,7 +119,10 @@ class SurfacePoints:
         return np.where(self.bound[:, None], points, np.nan)
 
     def matrix(self, triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
-        """(N, V) sparse matrix that samples values of the V vertices; unbound rows are zero."""
+        """Sparse matrix (N, V) that samples values of vertices, by the mesh's triangles (T, 3).
+
+        Rows of unbound points are zero.
+        """
         rows = np.repeat(np.arange(len(self)), 3)
         columns = self.corners(triangles).reshape(-1)
         data = (self.barycentric * self.bound[:, None]).reshape(-1)

@@ -61,6 +61,9 @@ def resolve_contact(
     """Push apart what lies inside the other lip, each side by its share of mobility.
 
     Args:
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        lips: of the topology.
         mobility: (V,) in (0, 1]; vertices that cameras see move less.
         reach_mm: deeper than this is no contact of these two surfaces.
         slack_mm: depth that is let be.

@@ -43,6 +43,14 @@ class Reference:
         triangles: np.ndarray,
         plate: ThinPlate | None = None,
     ) -> Reference:
+        """Of a frame and its mesh.
+
+        Args:
+            frame: with its images.
+            vertices_mm: (V, 3) world, mm.
+            triangles: (T, 3).
+            plate: of the neutral; None: the mesh is the neutral.
+        """
         vertices_mm = np.asarray(vertices_mm, dtype=np.float64)
         plate = ThinPlate.of(vertices_mm, triangles) if plate is None else plate
         sights = see_all(frame, vertices_mm, triangles)
@@ -55,7 +63,7 @@ class Reference:
 
 
 def see_all(frame: Frame, vertices_mm: np.ndarray, triangles: np.ndarray) -> dict[str, Sight]:
-    """Sight of every camera of a frame."""
+    """What every camera of a frame sees of a mesh, vertices_mm (V, 3) world, triangles (T, 3)."""
     caster = RayCaster(vertices_mm, triangles)
     normals = vertex_normals(vertices_mm, triangles)
     return {

@@ -65,7 +65,7 @@ class Neutral:
 
 
 def stereo_cloud(frame: Frame, target_mm: np.ndarray, settings: StereoSettings) -> Cloud:
-    """Points of all stereo pairs of a frame within reach of a point, not yet gated or fused."""
+    """Points of all stereo pairs of a frame within reach of target_mm (3,), not gated or fused."""
     cameras = {name: view.camera for name, view in frame.views.items()}
     listed = [pair for pair in settings.pairs if all(n in cameras for n in pair)]
     pairs = stereo_pairs(cameras, target_mm, listed)

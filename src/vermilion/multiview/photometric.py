@@ -52,7 +52,16 @@ def sight(
     min_cosine: float = 0.15,
     tolerance_mm: float = 0.3,
 ) -> Sight:
-    """Project and test the visibility of a mesh's vertices."""
+    """Project and test the visibility of a mesh's vertices.
+
+    Args:
+        caster: of the mesh.
+        camera: in its world.
+        vertices_mm: (V, 3) world, mm.
+        normals: (V, 3) unit; None: they are found here.
+        min_cosine: of a vertex that faces the camera.
+        tolerance_mm: how far in front of a vertex the mesh may lie.
+    """
     if normals is None:
         normals = vertex_normals(vertices_mm, caster.triangles)
     towards = camera.centre_mm - vertices_mm
@@ -81,7 +90,7 @@ class Raster:
     hits: Hits
 
     def cut(self, image: np.ndarray) -> np.ndarray:
-        """The window of an image (h, w)."""
+        """The window (h', w') of an image (h, w)."""
         bottom, right = self.top_px + self.camera.height_px, self.left_px + self.camera.width_px
         return image[self.top_px : bottom, self.left_px : right]
 
@@ -164,11 +173,22 @@ class FlowMatcher:
         self.window_px = window_px
 
     def flow(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """(h, w, 2) with a(x) ~ b(x + flow(x)); images (h, w) uint8."""
+        """Flow (h, w, 2) px with a(x) ~ b(x + flow(x)), of a and b (h, w) uint8."""
         return self._flow.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), None)
 
-    def agreement(self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray):
-        """Local normalised correlation (h, w) of a(x) and b(x + flow) inside a mask."""
+    def agreement(
+        self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray
+    ) -> np.ndarray:
+        """Local normalised correlation of a(x) and b(x + flow) inside a mask.
+
+        Args:
+            a, b: (h, w) uint8, locally normalised.
+            flow: (h, w, 2) px.
+            mask: (h, w) bool.
+
+        Returns:
+            (h, w) float32 in [-1, 1]; zero outside the mask.
+        """
         there = _along(b.astype(np.float32), flow, cv2.BORDER_CONSTANT)
         weight = mask.astype(np.float32)
         a, b = (a.astype(np.float32) - 128) * weight, (there - 128) * weight
@@ -180,7 +200,7 @@ class FlowMatcher:
         return np.where(mask, (ab - ma * mb) / variance, 0.0).astype(np.float32)
 
     def round_trip(self, flow: np.ndarray, back: np.ndarray) -> np.ndarray:
-        """Distance (h, w) px by which flow there and flow back (h, w, 2) miss the start.
+        """Distance (h, w) px by which flow (h, w, 2) and the flow back (h, w, 2) miss the start.
 
         What one image hides has no way back.
         """

@@ -29,6 +29,15 @@ def normal_offsets(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distance of the real surface from each vertex along its normal, from all pairs.
 
+    Args:
+        frame: with its images.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        pairs: of cameras.
+        matcher: of images.
+        sigma_px: expected error of a measurement.
+        max_offset_mm: farther offsets do not count.
+
     Returns:
         (offset (V,) mm, information (V,) 1/mm^2, zero where no pair sees the vertex).
     """
@@ -71,8 +80,10 @@ def normal_offsets(
     return robust_mean(np.array(offsets), np.array(weights))
 
 
-def robust_mean(values: np.ndarray, weights: np.ndarray, rounds: int = 5):
-    """Weighted mean over the first axis with Cauchy weights, (mean (V,), information (V,))."""
+def robust_mean(
+    values: np.ndarray, weights: np.ndarray, rounds: int = 5
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (V,) and its information (V,) of values (N, V), weights (N, V), with Cauchy weights."""
     total = weights.sum(axis=0)
     w = weights
     for _ in range(rounds):
@@ -94,6 +105,15 @@ def polish(
     max_offset_mm: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the mesh onto the photo-consistent surface, one round a stiffness.
+
+    Args:
+        frame: with its images.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        pairs: of cameras.
+        matcher: of images.
+        lengths_mm: stiffness of each round (see `solver`).
+        sigma_px, max_offset_mm: see `normal_offsets`.
 
     Returns:
         (vertices (V, 3) mm, information (V,) of the last round).

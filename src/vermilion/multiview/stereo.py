@@ -31,6 +31,7 @@ class Cloud:
         return len(self.points_mm)
 
     def select(self, keep: np.ndarray) -> Cloud:
+        """The points of keep: (N,) bool, or ids (n,)."""
         return Cloud(self.points_mm[keep], self.normals[keep], self.sigma_mm[keep])
 
     @classmethod

@@ -84,7 +84,15 @@ def open_coarse(
     triangles: np.ndarray,
     scale: float,
 ) -> tuple[Reference, Callable[[int], Frame]]:
-    """A frame whose mesh (V, 3) is known, at a smaller size, and a reader of frames of that size."""
+    """A frame whose mesh is known, at a smaller size, and a reader of frames of that size.
+
+    Args:
+        images: of the take.
+        number: of the frame.
+        vertices_mm: (V, 3) its mesh, world, mm.
+        triangles: (T, 3).
+        scale: of the images.
+    """
 
     @lru_cache(maxsize=KEPT_FRAMES)
     def load(number: int) -> Frame:
@@ -118,7 +126,7 @@ def frame_cloud(
     stereo: StereoSettings,
     settings: RefineSettings,
 ) -> Cloud:
-    """Stereo points of a frame near a mesh; none if switched off or no pair is left."""
+    """Stereo points of a frame near vertices_mm (V, 3), world; none if off or without a pair."""
     scale = settings.cloud_scale
     if not scale:
         return Cloud.join([])
@@ -144,6 +152,16 @@ class Refiner:
         settings: RefineSettings,
         matcher: FlowMatcher,
     ):
+        """Read the neutral's frame.
+
+        Args:
+            images: of the take.
+            model: the template, V vertices.
+            neutral_frame: its number.
+            neutral_mm: (V, 3) its mesh, world, mm.
+            stereo, settings: see their classes.
+            matcher: of images.
+        """
         self.images, self.model, self.settings, self.matcher = images, model, settings, matcher
         self.neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         frame = images.load(neutral_frame)
@@ -167,7 +185,7 @@ class Refiner:
         return np.sum([sight.visible for sight in sights], axis=0) >= 2
 
     def refine(self, number: int, start_mm: np.ndarray) -> RefinedFrame:
-        """Register a frame from its coarse position (V, 3); a failure is flagged, not raised.
+        """Register a frame from start_mm (V, 3), world; a failure is flagged, not raised.
 
         The neutral's frame is the neutral.
         """

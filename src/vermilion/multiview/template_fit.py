@@ -56,6 +56,14 @@ def deform_to_landmarks(
     """Laplacian deformation of the fitted template onto the landmarks, (V, 3) mm.
 
     A landmark weighs as an area of `length_mm` squared, less where it lies over `sigma_mm` away.
+
+    Args:
+        vertices_mm: (V, 3) the fitted template, world, mm.
+        plate: of it.
+        vertex_ids: (66,) vertices of the landmarks.
+        landmarks: those not valid are left out.
+        length_mm: stiffness (see `solver`).
+        sigma_mm: expected error of a landmark.
     """
     use = landmarks.valid
     ids, target = vertex_ids[use], landmarks.points_mm[use]

@@ -85,11 +85,15 @@ def track_clip(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> Clip:
-    """Track a clip whose first frame is known (V, 3).
+    """Track a clip whose first frame is known.
 
     Args:
+        reference: the neutral.
         frames: of the clip, and the anchor that ends it where `last_mm` is its position.
         load: reads a frame at the reference's resolution; raises InputError if it cannot.
+        first_mm, last_mm: (V, 3) of the first frame and of the anchor, world, mm; None: no anchor.
+        matcher: of images.
+        settings: see `TrackSettings`.
     """
     forward, reasons = _sweep(reference, frames, load, first_mm, matcher, settings)
     if last_mm is None:
@@ -128,9 +132,19 @@ def follow(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> np.ndarray:
-    """Carry a mesh from one frame to the next by the flow between their images, (V, 3) mm.
+    """Carry a mesh from one frame to the next by the flow between their images.
 
     Flow that does not lead back to where it began, and flow between unlike places, weighs less.
+
+    Args:
+        reference: the neutral.
+        before, after: the two frames.
+        vertices_mm: (V, 3) of the frame before, world, mm.
+        matcher: of images.
+        settings: see `TrackSettings`.
+
+    Returns:
+        (V, 3) of the frame after, world, mm.
     """
     sights = see_all(before, vertices_mm, reference.triangles)
     jacobians, offsets, weights = [], [], []

@@ -80,7 +80,7 @@ def _shrunk(view: View, scale: float, window_px: float, floor: float) -> View:
 
 
 def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
-    """Local contrast normalisation of (h, w) in [0, 1] to uint8 round 128.
+    """Local contrast normalisation of grey (h, w) in [0, 1] to (h, w) uint8 round 128.
 
     Two box filters have the spread of a Gaussian of `window_px`, at a cost that does not grow.
     """

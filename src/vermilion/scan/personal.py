@@ -147,7 +147,7 @@ def _distance_to(scan: Mesh, points_mm: np.ndarray) -> np.ndarray:
 
 
 def transferred(generic: FaceModel, fit: ScanFit, registered_mm: np.ndarray) -> FaceModel:
-    """The generic model's neutral and expressions carried to a registered pose (V, 3)."""
+    """The generic model's neutral and expressions carried to a pose, registered_mm (V, 3), head frame."""
     posed = generic.vertices(fit.identity, fit.weights)
     transfer = DeformationTransfer(
         posed, registered_mm, generic.triangles, generic.regions["rigid"]
