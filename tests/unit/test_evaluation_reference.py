@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from tests.unit.evaluation_face import sheet_face
-from vermilion.evaluation.reference import Near, Reference, drift, reference_of, truth_of_vertices
+from vermilion.evaluation.reference import (
+    MatchTolerance,
+    Reference,
+    drift,
+    reference_of,
+    truth_of_vertices,
+)
 from vermilion.faces.lips import lip_sides, triangle_sides
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh
@@ -23,7 +29,7 @@ def test_truth_of_vertices_never_mixes_the_lips():
         coarse.neutral_mm, None, 0.5, sides, triangle_sides(fine.triangles, of_fine)
     )
     mesh = Mesh(fine.neutral_mm, fine.triangles)
-    found = truth_of_vertices(where, mesh, of_fine, sides, mesh, Near(3.0, 0.5))
+    found = truth_of_vertices(where, mesh, of_fine, sides, mesh, MatchTolerance(3.0, 0.5))
     assert found.bound.all()
     corners = of_fine[fine.triangles[found.triangle]]
     for side in (1, -1):

@@ -16,7 +16,7 @@ from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, topology_hash, triangle_normals
-from vermilion.geometry.registration import Landmarks, Schedule, register
+from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
@@ -222,7 +222,7 @@ def register_neutral(
     registered, _ = register(
         coarse.mesh.with_vertices(placed),
         accurate.mesh,
-        Landmarks(coarse.landmarks[pairs], wanted, weights),
+        LandmarkTargets(coarse.landmarks[pairs], wanted, weights),
         Schedule(settings.wavelengths_mm, settings.search_distance_mm, settings.max_angle_deg),
         sides=coarse.sides,
         triangle_sides=accurate.triangle_sides,

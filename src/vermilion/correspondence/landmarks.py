@@ -8,11 +8,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.geometry.surface_points import SurfacePoints
-
-#: Points of the 66-point scheme that mark the face's outline: they slide over the surface.
-JAW = np.arange(17)
-LIPS = np.arange(48, 66)
-EYES = np.arange(36, 48)
+from vermilion.landmarks.scheme import JAW
 
 
 def back_project(

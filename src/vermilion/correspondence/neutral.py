@@ -14,7 +14,7 @@ from vermilion.correspondence.correspondence import (
     MarkedMesh,
     find_correspondence,
 )
-from vermilion.correspondence.landmarks import EYES, LIPS, back_project, inner_features
+from vermilion.correspondence.landmarks import back_project, inner_features
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.closest_points import closest_barycentric
@@ -22,6 +22,7 @@ from vermilion.geometry.head_frame import head_from_world
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT, MOUTH
 from vermilion.storage.errors import InputError
 from vermilion.storage.quality import QualityRow
 from vermilion.tracking.result import TrackedTake
@@ -108,7 +109,7 @@ def correspond_neutrals(
     """
     coarse, accurate = _marked(neutral, tracker, template, landmarks)
     points = coarse.landmarks.sample(coarse.mesh.vertices_mm, coarse.mesh.triangles)
-    lips, lids = points[LIPS], points[EYES]
+    lips, lids = points[MOUTH], points[np.concatenate([EYE_RIGHT, EYE_LEFT])]
     place = {"subject": neutral.subject, "take": neutral.take}
     if not np.isfinite(lips).all(axis=1).any():
         raise InputError(

@@ -11,7 +11,7 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
-from vermilion.evaluation.reference import Near, Reference, truth_of_vertices
+from vermilion.evaluation.reference import MatchTolerance, Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
@@ -65,7 +65,7 @@ def points_on_truth(
         lip_sides(template),
         lip_sides(tracker),
         Mesh(np.asarray(truth_neutral_mm, dtype=np.float64), truth_triangles),
-        Near(max_distance_mm, float(np.cos(np.radians(max_normal_angle_deg)))),
+        MatchTolerance(max_distance_mm, float(np.cos(np.radians(max_normal_angle_deg)))),
     )
 
 

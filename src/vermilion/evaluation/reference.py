@@ -89,7 +89,7 @@ def reference_of(
 
 
 @dataclass(frozen=True)
-class Near:
+class MatchTolerance:
     """What counts as the same place on two surfaces.
 
     Attributes:
@@ -107,7 +107,7 @@ def attach(
     sides: np.ndarray,
     surface: Surface,
     surface_sides: np.ndarray,
-    near: Near,
+    near: MatchTolerance,
 ) -> SurfacePoints:
     """The point of a surface that each given point lies on, in the neutral, once a subject.
 
@@ -127,7 +127,7 @@ def attach(
     return found.restricted(found.distance_mm <= near.max_distance_mm)
 
 
-def transfer_lips(mesh: Mesh, sides: np.ndarray, other: Mesh, near: Near) -> np.ndarray:
+def transfer_lips(mesh: Mesh, sides: np.ndarray, other: Mesh, near: MatchTolerance) -> np.ndarray:
     """Lips of the triangles of another mesh of the same face in the same pose.
 
     Args:
@@ -154,7 +154,7 @@ def truth_of_vertices(
     h_sides: np.ndarray,
     sides: np.ndarray,
     truth_neutral: Mesh,
-    near: Near,
+    near: MatchTolerance,
 ) -> SurfacePoints:
     """The truth's point of each vertex of C: C vertex -> H -> closest point of the truth's neutral.
 

@@ -23,7 +23,7 @@ from vermilion.geometry.surface_points import SurfacePoints
 
 
 @dataclass(frozen=True)
-class Landmarks:
+class LandmarkTargets:
     """Points of the moving mesh whose places on the other surface are known.
 
     Attributes:
@@ -91,7 +91,7 @@ class BendingDeformer:
 def register(
     mesh: Mesh,
     onto: Mesh,
-    landmarks: Landmarks,
+    landmarks: LandmarkTargets,
     schedule: Schedule,
     *,
     searching: np.ndarray | None = None,

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.descent import (
     DescentDetector,
-    Similarity,
+    ImageSimilarity,
     shape_features,
     stage_sizes,
 )
@@ -117,11 +117,11 @@ def mean_shape(points: np.ndarray, rounds: int = 5) -> np.ndarray:
     """Mean of shapes (N, 66, 2) after similarity alignment: size 1, box about the origin."""
     mean = _normalised(points[0])
     for _ in range(rounds):
-        aligned = [Similarity.between(shape, mean)(shape) for shape in points]
+        aligned = [ImageSimilarity.between(shape, mean)(shape) for shape in points]
         mean = _normalised(np.mean(aligned, axis=0))
     # Upright: what is left of the first shape's turn is taken out by symmetry.
     mirror = mean[MIRROR] * [-1, 1]
-    return _normalised(0.5 * (mean + Similarity.between(mirror, mean)(mirror)))
+    return _normalised(0.5 * (mean + ImageSimilarity.between(mirror, mean)(mirror)))
 
 
 def _normalised(shape: np.ndarray) -> np.ndarray:

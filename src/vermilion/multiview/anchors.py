@@ -17,7 +17,7 @@ import numpy as np
 from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import Reference
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.refine import MatchSettings, register_frame
+from vermilion.multiview.refine import FrameMatchSettings, register_frame
 from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
 
@@ -104,7 +104,7 @@ def find_anchor(
     number = int(window[best])
     frame = load(number)
     levels = [(reference, frame, 2 * settings.length_mm), (reference, frame, settings.length_mm)]
-    match = MatchSettings(settings.sigma_px, settings.max_step_mm, settings.min_agreement)
+    match = FrameMatchSettings(settings.sigma_px, settings.max_step_mm, settings.min_agreement)
     found = register_frame(levels, reference.vertices_mm, matcher, match)
     return Anchor(number, found.vertices_mm, window, similarity)
 

@@ -50,33 +50,30 @@ def normal_offsets(
         name: rasterise(caster, view.camera, sights[name]) for name, view in frame.views.items()
     }
     offsets, weights = [], []
-    for a, b in pairs:
-        for source, target in ((a, b), (b, a)):
-            motion = measure_motion(
-                matcher,
-                rasters[target],
-                sights[target],
-                frame.views[target],
-                frame.views[source],
-                sights[source],
-            )
-            origin = frame.views[source].camera.centre_mm
-            ray = vertices_mm - origin
-            ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-            slope = np.einsum(
-                "vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray
-            )
-            square = np.maximum((slope * slope).sum(axis=1), 1e-9)
-            along = (slope * motion.offset_px).sum(axis=1) / square
-            across = motion.offset_px - along[:, None] * slope
-            off_line = np.linalg.norm(across, axis=1)
-            cosine = (ray * normals).sum(axis=1)
-            offset = along * cosine
-            weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
-            weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
-            weight[np.abs(offset) > max_offset_mm] = 0
-            offsets.append(offset)
-            weights.append(weight)
+    for source, target in (way for a, b in pairs for way in ((a, b), (b, a))):
+        motion = measure_motion(
+            matcher,
+            rasters[target],
+            sights[target],
+            frame.views[target],
+            frame.views[source],
+            sights[source],
+        )
+        origin = frame.views[source].camera.centre_mm
+        ray = vertices_mm - origin
+        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+        slope = np.einsum("vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray)
+        square = np.maximum((slope * slope).sum(axis=1), 1e-9)
+        along = (slope * motion.offset_px).sum(axis=1) / square
+        across = motion.offset_px - along[:, None] * slope
+        off_line = np.linalg.norm(across, axis=1)
+        cosine = (ray * normals).sum(axis=1)
+        offset = along * cosine
+        weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
+        weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
+        weight[np.abs(offset) > max_offset_mm] = 0
+        offsets.append(offset)
+        weights.append(weight)
     return robust_mean(np.array(offsets), np.array(weights))
 
 

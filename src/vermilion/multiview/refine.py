@@ -43,7 +43,7 @@ class Registered:
 
 
 @dataclass(frozen=True)
-class MatchSettings:
+class FrameMatchSettings:
     """How a frame is matched.
 
     Attributes:
@@ -63,7 +63,7 @@ def register_frame(
     levels: Sequence[tuple[Reference, Frame, float]],
     start_mm: np.ndarray,
     matcher: FlowMatcher,
-    settings: MatchSettings,
+    settings: FrameMatchSettings,
     cloud: CloudData | None = None,
 ) -> Registered:
     """Register a frame from a start within some pixels.
@@ -73,7 +73,7 @@ def register_frame(
             mm (see `solver`).
         start_mm: (V, 3) world, mm.
         matcher: of images.
-        settings: see `MatchSettings`.
+        settings: see `FrameMatchSettings`.
         cloud: the frame's stereo points.
 
     Returns:
@@ -102,7 +102,7 @@ def measure_frame(
     frame: Frame,
     vertices_mm: np.ndarray,
     matcher: FlowMatcher,
-    settings: MatchSettings,
+    settings: FrameMatchSettings,
 ) -> tuple[Measurements, np.ndarray]:
     """What all cameras of a frame, that the reference has too, say of a mesh.
 
@@ -111,7 +111,7 @@ def measure_frame(
         frame: with its images.
         vertices_mm: (V, 3) the frame's mesh as it is thought to be, world, mm.
         matcher: of images.
-        settings: see `MatchSettings`.
+        settings: see `FrameMatchSettings`.
 
     Returns:
         the measurements, and the mesh's normals (V, 3).

@@ -17,7 +17,7 @@ from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
 from vermilion.multiview.motion import CloudData, Reference, cloud_planes
 from vermilion.multiview.neutral import skin_of, stereo_cloud
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.refine import MatchSettings, Registered, register_frame
+from vermilion.multiview.refine import FrameMatchSettings, Registered, register_frame
 from vermilion.multiview.solver import ThinPlate
 from vermilion.multiview.stereo import Cloud, StereoSettings
 from vermilion.multiview.views import Frame, load_frame, shrunk
@@ -220,7 +220,7 @@ class Refiner:
             for scale, length in rounds
         ]
         settings = self.settings
-        match = MatchSettings(
+        match = FrameMatchSettings(
             settings.sigma_px, settings.max_step_mm, settings.min_agreement, settings.ray_stride_px
         )
         registered = register_frame(levels, start_mm, self.matcher, match, self._data(cloud))

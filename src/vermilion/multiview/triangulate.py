@@ -10,9 +10,6 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera
 
-#: The jaw's silhouette slides over the skin from view to view: never triangulated.
-SLIDING = np.arange(17)
-
 
 @dataclass(frozen=True)
 class Triangulated:

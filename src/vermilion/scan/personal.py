@@ -9,7 +9,7 @@ import numpy as np
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, boundary_edges, triangle_areas, vertex_areas
-from vermilion.geometry.registration import Landmarks, Schedule, register
+from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.scan.fit import ScanFit, fit_landmarks
 from vermilion.scan.landmarks import LEAST_GIVEN, ScanLandmarks
@@ -135,7 +135,7 @@ def _registered(
     posed = Mesh(generic.vertices(fit.identity, fit.weights), generic.triangles)
     known = np.isfinite(fit.points_mm).all(axis=1)
     points = SurfacePoints.at_vertices(generic.landmarks[known], generic.triangles)
-    landmarks = Landmarks(points, fit.points_mm[known], 1.0 / fit.sigma_mm[known] ** 2)
+    landmarks = LandmarkTargets(points, fit.points_mm[known], 1.0 / fit.sigma_mm[known] ** 2)
     wavelengths = [w for w in _WAVELENGTHS_MM if w > finest_mm] + [finest_mm] * 2
     schedule = Schedule(wavelengths, _SEARCH_MM, _MAX_ANGLE_DEG, _NARROWEST)
     return register(posed, in_head, landmarks, schedule, searching=searching_vertices(generic))

@@ -7,7 +7,13 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.masks import mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
-from vermilion.evaluation.reference import Near, attach, drift, reference_of, transfer_lips
+from vermilion.evaluation.reference import (
+    MatchTolerance,
+    attach,
+    drift,
+    reference_of,
+    transfer_lips,
+)
 from vermilion.evaluation.take import evaluate_reconstruction
 from vermilion.evaluation.truth import read_truth
 from vermilion.evaluation.visible import cameras_that_see
@@ -27,7 +33,9 @@ def main(snakemake):
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     options = MeasuresConfig(**cfg["evaluation.measures"])
     reach = ReferenceConfig(**cfg["evaluation.reference"])
-    near = Near(reach.max_distance_mm, float(np.cos(np.radians(reach.max_normal_angle_deg))))
+    near = MatchTolerance(
+        reach.max_distance_mm, float(np.cos(np.radians(reach.max_normal_angle_deg)))
+    )
     template, correspondence = (
         FaceModel.load(inputs.template),
         Correspondence.load(inputs.correspondence),
