@@ -39,8 +39,8 @@ from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.studio import StudioConfig, StudioTake
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import align_frames
 from vermilion.geometry.camera import Camera, read_cameras, write_cameras
-from vermilion.geometry.frame_alignment import align_frames, moved
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import label, to_display
 from vermilion.imaging.images import read_image
@@ -294,7 +294,7 @@ def measure_tracks(scene: Scene) -> None:
     regions = regions_of_mask(model, bound["coarse_neutral_mm"], bound["mask"])
     print("\nmm between C on truly bare frames and on\tmouth mask\tits worst frame\tvermilion")
     for name, take in (("inpainted", "rom"), ("bare, other noise", "bare2")):
-        aligned = moved(meshes[take], *align_frames(meshes[take], meshes["bare"], regions.rest))
+        aligned = align_frames(meshes[take], meshes["bare"], regions.rest).apply(meshes[take])
         apart = np.linalg.norm(aligned - meshes["bare"], axis=2)
         mouth, lips = (
             apart @ (w / w.sum()) for w in map(regions.weights.get, ("mouth", "vermilion"))

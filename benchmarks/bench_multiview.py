@@ -31,8 +31,8 @@ from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.closest_points import Surface
 from vermilion.imaging.frames import open_frames
 from vermilion.multiview.files import read_neutral, read_track
-from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 
 

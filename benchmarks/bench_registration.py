@@ -33,9 +33,10 @@ from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.imaging.frames import open_frames
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.files import read_neutral, read_views
-from vermilion.multiview.neutral import StereoSettings, stereo_cloud
+from vermilion.multiview.neutral import stereo_cloud
 from vermilion.multiview.nonrigid import register_to_cloud
 from vermilion.multiview.solver import ThinPlate
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages
 from vermilion.multiview.template_fit import deform_to_landmarks, fit_template
 from vermilion.multiview.triangulate import triangulate_landmarks
@@ -56,7 +57,7 @@ def main() -> None:
         cameras, names, points, confidence, min_confidence=settings.min_confidence,
         max_distance_mm=settings.landmark_distance_mm,
     )  # fmt: skip
-    fitted, _, _ = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
+    fitted = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
     start = deform_to_landmarks(
         fitted, ThinPlate.of(fitted, model.triangles), model.landmarks, landmarks,
         length_mm=settings.landmark_length_mm, sigma_mm=settings.landmark_sigma_mm,

@@ -27,12 +27,14 @@ from scipy.spatial import cKDTree
 from vermilion.appearance.estimate import Appearance
 from vermilion.config.tracking import TrackingConfig
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import rigid_alignment, vertex_normals
+from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
@@ -57,13 +59,12 @@ def seen(camera: Camera, vertices: np.ndarray, triangles: np.ndarray, keep: np.n
 
 def first_alignment(source: np.ndarray, target: cKDTree) -> tuple[np.ndarray, np.ndarray]:
     """Rigid motion of points (N, 3) onto a cloud by iterated closest points, 5 % left out."""
-    rotation, translation = np.eye(3), np.zeros(3)
+    found = Similarity(1.0, np.eye(3), np.zeros(3))
     for _ in range(_ROUNDS):
-        moved = source @ rotation.T + translation
-        distance, nearest = target.query(moved)
+        distance, nearest = target.query(found.apply(source))
         near = distance <= np.quantile(distance, 0.95)
-        rotation, translation = rigid_alignment(source[near], target.data[nearest[near]])
-    return rotation, translation
+        found = similarity_alignment(source[near], target.data[nearest[near]], scale=1.0)
+    return found.rotation, found.translation
 
 
 def distances(model, meshes, camera, truth, truth_triangles, truth_face) -> dict[str, float]:
@@ -135,7 +136,7 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     bending = LayerSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
     layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
     frames, levels = open_frames(source), len(photometric.iterations)
-    rows = np.unique(np.linspace(0, len(fit.frames) - 1, count).round().astype(int))
+    rows = evenly_spaced(len(fit.frames), count)
     began = time.process_time()
     fit_motion(start.landmark_shape(), start.seen, focal_px(fit.camera), fps, settings)
     base = (time.process_time() - began) / len(fit.frames)

@@ -14,7 +14,8 @@ from vermilion.config.training import TrainingConfig
 from vermilion.correction.correct import correct_sequence, correct_with_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.database.read import LipDatabase
-from vermilion.geometry.mesh import rigid_alignment, vertex_areas
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.mesh import vertex_areas
 from vermilion.regression.model import load_model
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
@@ -173,10 +174,10 @@ def errors(scene, subject, corrected, frames):
     rest = correspondence.vertices.bound & ~in_mask & scene.tracker.regions["face"]
     result = []
     for frame in frames:
-        rotation, translation = rigid_alignment(
-            coarse[frame][rest], target[frame][rest], area[rest]
+        placed = similarity_alignment(
+            coarse[frame][rest], target[frame][rest], area[rest], scale=1.0
         )
-        offset = corrected[frame] @ rotation.T + translation - target[frame]
+        offset = placed.apply(corrected[frame]) - target[frame]
         distance = np.linalg.norm(offset[in_mask], axis=1)
         result.append(np.average(distance, weights=area[in_mask]))
     return float(np.mean(result))

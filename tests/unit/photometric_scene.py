@@ -9,10 +9,10 @@ from vermilion.faces.model import REGIONS, FaceModel
 from vermilion.geometry.camera import Camera, pinhole
 from vermilion.geometry.mesh import normalised, vertex_normals
 from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.geometry.rotations import rotation_matrix
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.landmark_fit.expression import HeadMotion
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import FitSettings
 
@@ -76,7 +76,7 @@ def motion(n_frames: int) -> np.ndarray:
 def mesh_of(model: FaceModel, x: np.ndarray, offsets_mm: np.ndarray | float = 0.0) -> np.ndarray:
     """(V, 3) in the camera frame."""
     local = model.vertices(None, x[6:]) + offsets_mm
-    return local @ (rotation_of(x[:3]) @ FACING).T + x[3:6]
+    return local @ (rotation_matrix(x[:3]) @ FACING).T + x[3:6]
 
 
 def image_of(model: FaceModel, vertices_mm: np.ndarray, camera: Camera = CAMERA) -> np.ndarray:
@@ -96,7 +96,7 @@ def take_parts(
     points = np.stack([CAMERA.project(mesh_of(model, row)[model.landmarks]) for row in truth])
     frames, valid = np.arange(len(x)), np.ones(len(x), dtype=bool)
     track = LandmarkTrack(frames, points, np.full((len(x), 66), 0.05), valid)
-    rotation = np.stack([rotation_of(row[:3]) @ FACING for row in x])
+    rotation = np.stack([rotation_matrix(row[:3]) @ FACING for row in x])
     head = HeadMotion(rotation, x[:, 3:6], x[:, 6:], np.ones(len(x)))
     fit = TrackedTake.of(frames, head, valid, CAMERA, model)
     person = Identity(

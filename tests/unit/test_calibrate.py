@@ -10,8 +10,8 @@ import pytest
 
 from vermilion.capture.board import Board, BoardDetector
 from vermilion.capture.calibrate import calibrate_rig
+from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.camera import Camera, look_at
-from vermilion.geometry.mesh import rigid_alignment
 from vermilion.storage.errors import InputError
 
 BOARD = Board("charuco", (9, 7), 20.0, 15.0, "DICT_4X4_50")
@@ -144,8 +144,8 @@ def test_a_rig_with_free_distortion_measures_space(seen):
     points = np.random.default_rng(3).uniform(-60, 60, (200, 3))
     rays = {n: result.cameras[n].rays(camera.project(points)) for n, camera in truth.items()}
     found = nearest_to_rays(rays)
-    rotation, shift = rigid_alignment(found, points)
-    error_mm = np.linalg.norm(found @ rotation.T + shift - points, axis=1)
+    placed = similarity_alignment(found, points, scale=1.0)
+    error_mm = np.linalg.norm(placed.apply(found) - points, axis=1)
     assert np.median(error_mm) < 0.1
     assert error_mm.max() < 0.5
 

@@ -14,7 +14,7 @@ from vermilion.detail.flow.six_frame_flow import (
     pyramid_sizes,
 )
 from vermilion.geometry.camera import look_at, pinhole
-from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.geometry.rotations import rotation_matrix
 
 HEIGHT, WIDTH = 96, 80
 CAMERA = pinhole(
@@ -148,7 +148,10 @@ def test_hidden_vertices_keep_their_shape_beside_those_that_follow():
 
 def test_head_motion_is_recovered_from_places_in_the_image():
     local = CAMERA.to_camera(sheet()[0])
-    rotation, translation = rotation_of(np.radians([2.0, -3.0, 1.0])), np.array([3.0, -2.0, 1.0])
+    rotation, translation = (
+        rotation_matrix(np.radians([2.0, -3.0, 1.0])),
+        np.array([3.0, -2.0, 1.0]),
+    )
     turned = local @ rotation.T
     arm = local.mean(axis=0)
     moved = turned - arm @ rotation.T + arm + translation

@@ -14,6 +14,7 @@ from vermilion.evaluation.measures import measure_rows
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
 from vermilion.evaluation.visible import cameras_that_see
+from vermilion.faces.lips import lip_sides
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.mesh import vertex_areas
 
@@ -66,7 +67,7 @@ def test_truth_in_another_world_has_no_error(face):
 def test_known_offset_of_the_lips_is_found_and_halved(face):
     model, regions = face
     truth = moving(model)
-    lips = regions.lips > 0
+    lips = lip_sides(model) != 0
     base, half = truth.copy(), truth.copy()
     base[:, lips, 2] += 3.0
     half[:, lips, 2] += 1.5
@@ -104,7 +105,7 @@ def test_lips_that_gape_where_truth_touches_are_counted(face):
     model = sheet_face(gap_mm=0.0)
     truth = moving(model)
     gaping = truth.copy()
-    gaping[:, (regions.lips == 1), 1] += 1.6
+    gaping[:, lip_sides(model) == 1, 1] += 1.6
     result, value = evaluate(model, regions, {"base": truth, "MS": gaping}, truth)
     assert value["false_open_rate", "mouth", "base"] == 0.0
     assert value["false_open_rate", "mouth", "MS"] == 1.0  # two of six frames touch
@@ -123,7 +124,7 @@ def test_jitter_is_that_of_the_result_beyond_the_truth(face):
     model, regions = face
     truth = np.repeat(model.neutral_mm[None], len(FRAMES), axis=0)
     shaken = truth.copy()
-    shaken[:, regions.lips > 0, 2] += 0.1 * np.array([1, -1, 1, -1, 1, -1])[:, None]
+    shaken[:, lip_sides(model) != 0, 2] += 0.1 * np.array([1, -1, 1, -1, 1, -1])[:, None]
     _, value = evaluate(model, regions, {"base": truth, "MS": shaken}, truth)
     assert value["jitter_mm", "vermilion", "MS"] == pytest.approx(0.4, abs=1e-9)
 
@@ -139,9 +140,9 @@ def test_vertices_without_a_counterpart_do_not_count(face):
     model, regions = face
     truth = moving(model)
     base = truth.copy()
-    base[:, regions.lips == 1, 2] += 3.0
+    base[:, lip_sides(model) == 1, 2] += 3.0
     known = truth.copy()
-    known[:, regions.lips == 1] = np.nan
+    known[:, lip_sides(model) == 1] = np.nan
     reference = Reference("truth", known, truth, model.triangles)
     result = evaluate_take({"base": base}, FRAMES, model, regions, reference, 2, 1, LipTolerances())
     rows = measure_rows(result.sums, "s", "t", 6, 200, 0.95, 0)

@@ -39,7 +39,7 @@ def test_error_of_a_kind_is_that_of_its_frames_alone():
     kinds = np.array(["kiss", "kiss", "open", "speech"])
     clips = np.array([0, 0, 1, 1])
     area = np.array([1.0, 3.0])
-    regions = Regions({"mouth": area, "vermilion": area}, np.zeros(2), np.zeros(2, np.int8))
+    regions = Regions({"mouth": area, "vermilion": area}, np.zeros(2))
     errors = np.array([[2.0, 2.0], [4.0, 4.0], [1.0, 5.0], [7.0, 7.0]])
     takes = [
         (
@@ -62,9 +62,7 @@ def test_error_of_a_kind_is_that_of_its_frames_alone():
 
 
 def test_takes_without_a_kind_are_joined_with_those_that_have_it():
-    regions = Regions(
-        {"mouth": np.ones(1), "vermilion": np.ones(1)}, np.zeros(1), np.zeros(1, np.int8)
-    )
+    regions = Regions({"mouth": np.ones(1), "vermilion": np.ones(1)}, np.zeros(1))
 
     def take(kind, error):
         sums = sums_of_kinds(np.full((2, 1), error), np.array([kind] * 2), regions, np.arange(2))

@@ -7,7 +7,7 @@ import pytest
 from tests.unit.synthetic_face import landmark_layout
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import linear_to_srgb, srgb_to_linear
-from vermilion.landmarks.descent import DescentDetector, Similarity
+from vermilion.landmarks.descent import DescentDetector, ImageSimilarity
 from vermilion.landmarks.network_input import network_input
 from vermilion.landmarks.networks import (
     FACE_FILE,
@@ -128,7 +128,7 @@ def test_similarity_between_shapes_is_exact():
     points = landmark_layout()[:, :2]
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     target = 2.5 * points @ turn.T + [3.0, -7.0]
-    assert np.allclose(Similarity.between(points, target)(points), target, atol=1e-9)
+    assert np.allclose(ImageSimilarity.between(points, target)(points), target, atol=1e-9)
 
 
 def test_ridge_regression_in_the_dual_is_that_in_the_primal():

@@ -1,13 +1,10 @@
 """Facts about triangle meshes."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from vermilion.geometry.mesh import (
     adjacency,
     boundary_edges,
-    rigid_alignment,
     submesh,
     triangle_areas,
     triangle_normals,
@@ -50,17 +47,3 @@ def test_submesh_keeps_geometry():
     ids, cropped = submesh(triangles, vertices[:, 0] <= 2.5)
     assert cropped.max() == len(ids) - 1
     assert np.isclose(triangle_areas(vertices[ids], cropped).sum(), 2.0 * 5.0)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**31), st.floats(-3.0, 3.0), st.floats(0.1, 5.0))
-def test_rigid_motion_is_recovered_whatever_the_weights(seed, angle, shift):
-    rng = np.random.default_rng(seed)
-    points = rng.normal(size=(20, 3)) * 30
-    c, s = np.cos(angle), np.sin(angle)
-    rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-    moved = points @ rotation.T + shift
-    found, translation = rigid_alignment(points, moved, rng.uniform(0.1, 1, 20))
-    assert np.allclose(found, rotation, atol=1e-9)
-    assert np.allclose(translation, shift, atol=1e-7)
-    assert np.isclose(np.linalg.det(found), 1.0)

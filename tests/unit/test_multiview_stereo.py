@@ -7,7 +7,7 @@ from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.mesh import Mesh
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.pairs import rectify, stereo_pairs
-from vermilion.multiview.stereo import Cloud, match_pair
+from vermilion.multiview.stereo import Cloud, StereoSettings, match_pair
 from vermilion.multiview.views import View, normalise
 from vermilion.storage.errors import InputError
 
@@ -75,10 +75,11 @@ def test_matched_points_lie_on_the_plane_with_its_normal():
     (a, normal), (b, _) = (
         textured_plane(camera(name, (x, 0, 400)), 0.3) for name, x in (("a", -50), ("b", 50))
     )
-    cloud = match_pair(
-        a, b, ORIGIN, 60.0, block_px=5, uniqueness_percent=5, consistency_px=1.0, speckle_px=50,
-        min_texture=4.0,
+    settings = StereoSettings(
+        pairs=(), reach_mm=60.0, block_px=5, uniqueness_percent=5, consistency_px=1.0,
+        speckle_px=50, min_texture=4.0, spacing_mm=2.0,
     )  # fmt: skip
+    cloud = match_pair(a, b, ORIGIN, settings)
     assert len(cloud) > 20_000
     mm_per_px = 400.0**2 / (900.0 * 100.0)
     error_px = np.abs(cloud.points_mm @ normal) / mm_per_px

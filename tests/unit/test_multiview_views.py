@@ -1,7 +1,5 @@
 """Views, triangulation, anchors and contact: identities and synthetic truth."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,8 +11,6 @@ from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.multiview.views import (
     load_frame,
     normalise,
-    sample,
-    undistorted,
 )
 from vermilion.storage.errors import InputError
 
@@ -55,29 +51,6 @@ def test_points_that_fewer_than_two_views_trust_are_unknown():
     assert not found.valid[5]
     assert np.isnan(found.points_mm[5]).all()
     assert found.valid.sum() == 65
-
-
-def test_sampling_a_linear_image_is_exact_at_many_points():
-    y, x = np.mgrid[:50, :60].astype(np.float32)
-    points = np.random.default_rng(0).uniform(1, 49, (70_000, 2))
-    found = sample(x + 0.5 + 10 * (y + 0.5), points)
-    assert np.abs(found - (points[:, 0] + 10 * points[:, 1])).max() < 0.2  # remap: 1/32 pixel
-
-
-def test_undistorted_image_agrees_with_the_pinhole():
-    params = (800.0, 805.0, 80.0, 60.0, -0.2, 0.05, 0.001, -0.002)
-    bent = replace(RIG["b"], model="OPENCV", params=params)
-    grid = bent.pixel_grid()
-    origins, directions = bent.rays(grid)
-    image = (origins[..., 0] + 400 * directions[..., 0]).astype(np.float32)  # smooth in the world
-    straight, image = undistorted(bent, image)
-    points = np.random.default_rng(2).uniform(-25, 25, (100, 3))
-    assert straight.is_pinhole
-    _, expected = straight.rays(straight.project(points))
-    inside = straight.in_image(straight.project(points), 12)
-    found = sample(image, straight.project(points))[inside]
-    world = origins[0, 0, 0] + 400 * expected[inside, 0]
-    assert np.abs(found - world).max() < 0.02
 
 
 class Source:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.heads import small_tracker
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.camera import look_at, pinhole
@@ -22,10 +22,10 @@ def seen(model, vertices_mm):
     camera = pinhole("cam", 2000.0, 800, 600, look_at(mouth + front, mouth, up))
     occluding = OccludingContour.of(model)
     outer, inner = (camera.project(ring.points(vertices_mm)) for ring in lip_rings(model, 80))
-    pixels = camera.project(occluding.points.of(vertices_mm))
+    pixels = camera.project(occluding.on(vertices_mm))
     _, points, above = occluding.match(pixels, outer, inner, np.ones(80, dtype=bool))
     assert above @ [0.0, -1.0] > 0.99  # pixels count downwards
-    return pixels[points], occluding.sides[points], occluding.points[points].of(vertices_mm)
+    return pixels[points], occluding.sides[points], occluding.on(vertices_mm)[points]
 
 
 def opened(model):
@@ -35,10 +35,10 @@ def opened(model):
 
 def test_no_point_of_a_lip_hangs_over_the_contour(model):
     vertices = opened(model)
-    sides = lips_with_inside(model)
+    sides = lip_sides(model, with_inside=True)
     _, side, points = seen(model, vertices)
     assert len(points) > 50
-    for lip, sign in ((1, 1.0), (2, -1.0)):
+    for lip, sign in ((1, 1.0), (-1, -1.0)):
         edge, all_of_lip = points[side == lip], vertices[sides == lip]
         height = np.interp(all_of_lip[:, 0], *edge[np.argsort(edge[:, 0])][:, :2].T)
         inside = np.abs(all_of_lip[:, 0]) < 0.8 * np.abs(edge[:, 0]).max()
@@ -54,7 +54,7 @@ def test_a_lip_that_rolls_over_its_line_hides_more_of_the_mouth(model):
     rolled[model.regions["vermilion_upper"] & ~line, 1] -= 3.0
     before, side_before, _ = seen(model, vertices)
     after, side_after, _ = seen(model, rolled)
-    for lip, moved in ((1, True), (2, False)):
+    for lip, moved in ((1, True), (-1, False)):
         change = np.median(after[side_after == lip, 1]) - np.median(before[side_before == lip, 1])
         assert (change > 1.0) == moved
 

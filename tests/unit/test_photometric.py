@@ -8,7 +8,9 @@ from tests.unit.photometric_scene import LIGHT, dome, image_of, mesh_of, motion,
 from vermilion.appearance.estimate import Sightings, estimate_appearance
 from vermilion.appearance.harmonics import harmonics, harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
-from vermilion.appearance.samples import SurfaceSamples, sample_skin
+from vermilion.appearance.samples import sample_skin
+from vermilion.geometry.rotations import rotation_matrix
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.ablations import ablation_rows
 from vermilion.tracking.image_fit.choose_frames import choose_frames
@@ -16,7 +18,6 @@ from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSett
 from vermilion.tracking.image_fit.join import join_frames
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
 from vermilion.tracking.image_fit.take import learn_appearance, refine_frames
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
 from vermilion.tracking.settings import FitSettings
 
@@ -61,7 +62,7 @@ def test_light_and_albedo_are_told_apart_by_the_skin_that_has_one_colour():
     albedo = np.tile([0.5, 0.35, 0.3], (count, 1)) * (1 + 0.05 * rng.normal(size=(count, 1)))
     albedo[:60] = [0.5, 0.1, 0.1]  # lips
     colours = (albedo * irradiance(normals, LIGHT))[:, None]
-    samples = SurfaceSamples(np.zeros(count, dtype=np.int32), np.full((count, 3), 1 / 3))
+    samples = SurfacePoints(np.zeros(count, dtype=np.int32), np.full((count, 3), 1 / 3))
     seen = Sightings(colours, normals, np.ones((frames, count)))
     found = estimate_appearance(np.arange(frames), samples, seen, 0.5)
     ratio = irradiance(normals, found.light) / irradiance(normals, LIGHT)
@@ -156,7 +157,7 @@ def test_layer_follows_what_the_model_cannot_make(scene):
     found = layer.solve(view)
     missed = np.linalg.norm(found - bulge, axis=1)
     assert near @ missed < 0.3 * near @ np.linalg.norm(bulge, axis=1)
-    in_camera = found @ (rotation_of(view.start[:3]) @ view.reference).T
+    in_camera = found @ (rotation_matrix(view.start[:3]) @ view.reference).T
     assert np.abs(in_camera[:, 2]).max() < 1e-9
     still = layer.solve(start.view(0, image_of(MODEL, mesh_of(MODEL, truth[0])), face, 1.0, 3))
     assert np.linalg.norm(still, axis=1).mean() < 0.15  # mm

@@ -98,14 +98,14 @@ def test_transfer_onto_a_larger_head_enlarges_the_expressions(generic):
 
 def test_a_known_head_is_recovered(generic, still):
     truth, made = still
-    truth = made.fit.to_head(truth)
+    truth = made.fit.head_from_scan.apply(truth)
     skin = searching_vertices(generic)
     away = np.linalg.norm(made.registered.vertices_mm - truth, axis=1)[skin]
     assert np.linalg.norm(truth - generic.neutral_mm, axis=1)[skin].mean() > 2
     assert away.mean() < 0.6  # along the surface a smooth face says little of what is where
     assert made.figures()["distance_mean_mm"] < 0.2
     assert made.quality().valid
-    assert made.fit.scale == pytest.approx(1.0, abs=0.03)
+    assert made.fit.head_from_scan.scale == pytest.approx(1.0, abs=0.03)
     assert made.model.n_identities == 0
     neutral_away = np.linalg.norm(made.model.neutral_mm - truth, axis=1)[skin]
     assert neutral_away.mean() < 1.0
@@ -124,7 +124,9 @@ def test_expressions_of_the_person_are_those_of_the_model_but_for_the_shape(gene
 def test_a_moved_turned_and_scaled_scan_gives_the_same_model(generic, still):
     _, still = still
     _, away = fitted(generic, scale=0.013, turn=(70, -130, 20), shift=(3, 9, -20))
-    assert away.fit.scale == pytest.approx(still.fit.scale / 0.013, rel=1e-6)
+    assert away.fit.head_from_scan.scale == pytest.approx(
+        still.fit.head_from_scan.scale / 0.013, rel=1e-6
+    )
     np.testing.assert_allclose(away.model.neutral_mm, still.model.neutral_mm, atol=1e-3)
     np.testing.assert_allclose(away.model.expressions_mm, still.model.expressions_mm, atol=1e-3)
 

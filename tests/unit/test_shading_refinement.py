@@ -13,7 +13,7 @@ from vermilion.detail.relief.subdivision import loop_subdivision
 from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.mesh import normalised, triangle_normals, vertex_normals
-from vermilion.tracking.landmark_fit.pose import rotation_of
+from vermilion.geometry.rotations import rotation_matrix
 
 SIDE = 41
 FACING = np.diag([1.0, -1.0, -1.0])  # world (y up, z to the viewer) to camera
@@ -138,7 +138,7 @@ def test_noise_of_a_clip_is_measured_and_its_light_found():
     true, n = clip(topology), len(topology.skin)
     rng, sights = np.random.default_rng(2), []
     for _ in range(10):
-        turn = rotation_of(rng.normal(0, 0.05, 3))
+        turn = rotation_matrix(rng.normal(0, 0.05, 3))
         normals = triangle_normals(points @ turn.T, topology.skin) @ FACING.T
         values = true.values(normals) + 2.0 * rng.normal(size=(n, 1))
         sights.append(Sight(values, np.ones(n), normals))
@@ -180,7 +180,7 @@ def test_tilts_return_the_normals_whatever_the_pose():
     tangent = tangents(points, normals, topology)
     tilts = tilts_of(normals, tangent, fine)
     assert tilted(normals, tangent, tilts) == pytest.approx(fine)
-    turn = rotation_of(np.array([0.2, -0.5, 0.1]))
+    turn = rotation_matrix(np.array([0.2, -0.5, 0.1]))
     turned = tangents(points @ turn.T, normals @ turn.T, topology)
     assert tilts_of(normals @ turn.T, turned, fine @ turn.T) == pytest.approx(tilts)
 

@@ -6,13 +6,13 @@ import pytest
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
 from vermilion.config.tracking import TrackingConfig
+from vermilion.geometry.rotations import rotation_matrix
 from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.storage.errors import InputError
 from vermilion.tracking.identity.landmark_identity import IdentitySettings, TakeSample, fit_identity
 from vermilion.tracking.identity.sampling import spread_frames
 from vermilion.tracking.landmark_fit.expression import FitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, project
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
 
 MODEL = synthetic_model()
@@ -92,7 +92,7 @@ def test_uniform_growth_is_taken_out():
 def test_identity_does_not_depend_on_the_world_turning():
     """The same images turned in the plane give the same person."""
     turned = sample()
-    turn = rotation_of(np.array([0, 0, 0.3]))[:2, :2]
+    turn = rotation_matrix(np.array([0, 0, 0.3]))[:2, :2]
     rolled = Observations(turned.seen.image @ turn.T, turned.seen.trust, turned.seen.valid)
     a = fit_identity(MODEL, [sample()])
     b = fit_identity(MODEL, [TakeSample("rom", rolled, 1400.0, True, turned.neutral)])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.unit.synthetic_face import synthetic_model
+from vermilion.geometry.rotations import rotation_matrix, rotation_vector
 from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.expression import FitSettings, fit_motion
 from vermilion.tracking.landmark_fit.observation import Observations, project
-from vermilion.tracking.landmark_fit.pose import rotation_of, vector_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 
 FOCAL_PX, FPS, N_FRAMES = 1400.0, 30.0, 40
@@ -25,7 +25,7 @@ def true_motion(n_frames=N_FRAMES):
     """A head that turns and nods while it opens its mouth and smiles."""
     t = np.linspace(0, 2 * np.pi, n_frames)[:, None]
     vectors = np.concatenate([0.15 * np.sin(t), 0.35 * np.sin(t + 1), 0.1 * np.cos(t)], axis=1)
-    rotation = rotation_of(vectors) @ np.diag([1.0, -1.0, -1.0])
+    rotation = rotation_matrix(vectors) @ np.diag([1.0, -1.0, -1.0])
     translation = np.concatenate([20 * np.sin(t), 10 * np.cos(t), 700 + 30 * np.sin(t)], axis=1)
     phases = np.arange(6)
     weights = np.clip(0.5 + 0.6 * np.sin(2 * t + phases), 0, 1)
@@ -41,7 +41,7 @@ def images(rotation, translation, weights, noise_px=0.0, seed=0):
 
 
 def angle_deg(a, b):
-    return np.degrees(np.linalg.norm(vector_of(a @ np.swapaxes(b, 1, 2)), axis=1))
+    return np.degrees(np.linalg.norm(rotation_vector(a @ np.swapaxes(b, 1, 2)), axis=1))
 
 
 def test_clean_landmarks_give_pose_and_weights_back():

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.appearance.harmonics import harmonics, irradiance
-from vermilion.appearance.samples import SurfaceSamples
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.storage.arrays import read_arrays, write_arrays
 
@@ -62,8 +62,8 @@ class Appearance:
     seen: np.ndarray
 
     @property
-    def samples(self) -> SurfaceSamples:
-        return SurfaceSamples(self.triangle, self.barycentric)
+    def samples(self) -> SurfacePoints:
+        return SurfacePoints(self.triangle, self.barycentric)
 
     def colours(self, normals: np.ndarray, level: int = 0) -> np.ndarray:
         """Predicted linear RGB (N, 3) of the samples with unit normals (N, 3), camera frame."""
@@ -80,7 +80,7 @@ class Appearance:
 
 
 def estimate_appearance(
-    frames: np.ndarray, samples: SurfaceSamples, seen: Sightings, albedo_prior: float
+    frames: np.ndarray, samples: SurfacePoints, seen: Sightings, albedo_prior: float
 ) -> Appearance:
     """Light and albedo from sightings of some frames.
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.appearance.samples import SurfaceSamples
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import incidence, normalised, triangle_cross
+from vermilion.geometry.surface_points import SurfacePoints
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class SampledFace:
         cls,
         model: FaceModel,
         neutral_mm: np.ndarray,
-        samples: SurfaceSamples,
+        samples: SurfacePoints,
         displacements_mm: np.ndarray | None = None,
     ) -> SampledFace:
         """At `neutral_mm` (V, 3); `displacements_mm` (K, V, 3), by default the expressions."""

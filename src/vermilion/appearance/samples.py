@@ -2,42 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import sparse
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import adjacency, boundary_edges, triangle_areas
+from vermilion.geometry.surface_points import SurfacePoints
 
 
-@dataclass(frozen=True)
-class SurfaceSamples:
-    """Fixed points of a mesh.
-
-    Attributes:
-        triangle: (N,) int32.
-        barycentric: (N, 3) float64.
-    """
-
-    triangle: np.ndarray
-    barycentric: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.triangle)
-
-    def __getitem__(self, rows: np.ndarray | slice) -> SurfaceSamples:
-        return SurfaceSamples(self.triangle[rows], self.barycentric[rows])
-
-    def matrix(self, triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
-        """(N, V): values at the samples = matrix @ values at the vertices."""
-        rows = np.repeat(np.arange(len(self)), 3)
-        columns = triangles[self.triangle].reshape(-1)
-        shape = (len(self), n_vertices)
-        return sparse.csr_matrix((self.barycentric.reshape(-1), (rows, columns)), shape=shape)
-
-
-def sample_skin(model: FaceModel, spacing_mm: float, border_rings: int = 2) -> SurfaceSamples:
+def sample_skin(model: FaceModel, spacing_mm: float, border_rings: int = 2) -> SurfacePoints:
     """Samples of the skin of the face, about `spacing_mm` apart on the mean face.
 
     Left out: the inside of the mouth, teeth, eyes, and `border_rings` rings of vertices along the
@@ -49,7 +22,7 @@ def sample_skin(model: FaceModel, spacing_mm: float, border_rings: int = 2) -> S
     counts = np.maximum(np.rint(areas / spacing_mm**2).astype(int), 1)
     which = np.repeat(np.arange(len(triangles)), counts)
     order = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return SurfaceSamples(triangles[which].astype(np.int32), _spread(order, counts[which]))
+    return SurfacePoints(triangles[which].astype(np.int32), _spread(order, counts[which]))
 
 
 def skin(model: FaceModel, border_rings: int) -> np.ndarray:

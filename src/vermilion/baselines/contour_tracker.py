@@ -25,7 +25,7 @@ from vermilion.features.rings import lip_rings
 from vermilion.features.search import inward_normals
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.head_frame import head_from_world, world_from_head
-from vermilion.geometry.mesh_points import MeshPoints
+from vermilion.geometry.surface_points import SurfacePoints
 
 _ROUNDS = 8
 _LEAST_POINTS = 20
@@ -66,7 +66,7 @@ class ContourTracker:
         size = (self.displacements_mm[:, lips] ** 2).sum(axis=2).mean(axis=1)
         self.penalty = np.sqrt(ridge * size)
         ring = lip_rings(model, n_samples)[0]
-        self.outer = MeshPoints.on_edges(ring.start, ring.end, ring.fraction)
+        self.outer = SurfacePoints.on_edges(ring.start, ring.end, ring.fraction, model.triangles)
         self.occluding = OccludingContour.of(model)
 
     def track(
@@ -107,20 +107,25 @@ class ContourTracker:
         seen = found.outer_found[f]
         across = inward_normals(smoothed_ring(found.outer_px[f], 2))[seen]
         outer = self.outer[seen]
-        outer_basis = outer.of(self.displacements_mm)
+        triangles = self.occluding.triangles
+        outer_basis = outer.sample(self.displacements_mm, triangles)
         for _ in range(_ROUNDS):
             mesh = base_mm + np.tensordot(weights, self.displacements_mm, 1)
-            parts = [view.equations(outer.of(mesh), outer_basis, found.outer_px[f, seen], across)]
+            parts = [
+                view.equations(
+                    outer.sample(mesh, triangles), outer_basis, found.outer_px[f, seen], across
+                )
+            ]
             inner, rows, up = self.occluding.match(
-                view.project(self.occluding.points.of(mesh)), found.outer_px[f],
+                view.project(self.occluding.on(mesh)), found.outer_px[f],
                 found.inner_px[f], found.inner_found[f],
             )  # fmt: skip
             if len(inner):
                 occluding = self.occluding.points[rows]
                 parts.append(
                     view.equations(
-                        occluding.of(mesh),
-                        occluding.of(self.displacements_mm),
+                        occluding.sample(mesh, triangles),
+                        occluding.sample(self.displacements_mm, triangles),
                         found.inner_px[f, inner],
                         np.broadcast_to(up, (len(inner), 2)),
                     )

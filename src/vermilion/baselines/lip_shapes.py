@@ -16,7 +16,7 @@ import numpy as np
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.geometry.head_frame import align_frames
+from vermilion.geometry.alignment import align_frames
 from vermilion.storage.arrays import load_arrays, save_arrays
 
 _ROUNDS = 20
@@ -84,8 +84,9 @@ class PosedTake:
     ) -> PosedTake:
         """Of H (F, V_H, 3) and its neutral (V_H, 3) in the world; frames that are not finite go."""
         neutral = correspondence.on_coarse(np.asarray(accurate_neutral_mm, dtype=np.float64))
-        meshes, _ = align_frames(
-            correspondence.on_coarse(np.asarray(accurate_mm)), neutral, correspondence.rigid
+        meshes = correspondence.on_coarse(np.asarray(accurate_mm))
+        meshes = align_frames(meshes, neutral, correspondence.rigid, trim=0.2, rounds=2).apply(
+            meshes
         )
         corners = np.unique(correspondence.coarse_triangles[correspondence.mask])
         whole = np.isfinite(meshes[:, corners]).all(axis=(1, 2))

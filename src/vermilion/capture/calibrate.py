@@ -12,6 +12,7 @@ import pycolmap
 from vermilion.capture.board import Board
 from vermilion.capture.bundle_adjust import Observations, RigEstimate, adjust_rig, reprojection
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.rotations import mean_rotation
 from vermilion.storage.errors import InputError
 
 #: Views of the board that one camera needs.
@@ -170,8 +171,7 @@ def _join(
 
 def _mean_pose(poses: Sequence[np.ndarray]) -> np.ndarray:
     """Chordal mean of rotations, median of translations."""
-    u, _, vt = np.linalg.svd(sum(pose[:, :3] for pose in poses))
-    rotation = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    rotation = mean_rotation(np.stack([pose[:, :3] for pose in poses]))
     return np.concatenate(
         [rotation, np.median([pose[:, 3] for pose in poses], axis=0)[:, None]], axis=1
     )

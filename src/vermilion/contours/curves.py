@@ -7,6 +7,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from vermilion.imaging.sampling import sample_bilinear
+
 #: Points of a curve through a loop.
 CURVE_POINTS = 240
 
@@ -66,9 +68,7 @@ def gap(curve: np.ndarray) -> np.ndarray:
 
 def sampled(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Bilinear values (n, m) of a plane (h, w) at points (n, m, 2)."""
-    x, y = (np.ascontiguousarray(points[..., k] - 0.5, dtype=np.float32) for k in range(2))
-    found = cv2.remap(plane, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return found.astype(np.float64)
+    return sample_bilinear(plane, points).astype(np.float64)
 
 
 def outward_normals(curve: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from vermilion.contours.paths import cheapest_path
+from vermilion.imaging.sampling import sample_bilinear
 from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
 
@@ -120,8 +121,7 @@ def dark_valley(
     offsets = np.arange(-reach_px, reach_px + 1e-9, 0.5)
     places = start + steps[:, None, None] * along + offsets[None, :, None] * across
     smooth = cv2.GaussianBlur(lightness.astype(np.float32), (0, 0), 1.0)
-    x, y = (np.ascontiguousarray(places[..., k] - 0.5, dtype=np.float32) for k in range(2))
-    lit = cv2.remap(smooth, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    lit = sample_bilinear(smooth, places)
     cost = lit.astype(np.float64) / max(float(np.ptp(lit)), 1e-6)
     cost[0] += np.abs(offsets)  # it starts at the opening
     columns = cheapest_path(cost, np.full(len(steps), 0.1))

@@ -14,6 +14,7 @@ from vermilion.imaging.frames import FrameSource
 from vermilion.imaging.images import read_channels, write_channels
 from vermilion.landmarks.scheme import interocular_px
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.quality import QualityRow
 
 INNER_COLOUR, OUTER_COLOUR = (255, 70, 60), (70, 255, 90)
@@ -116,6 +117,4 @@ def sheet(images: list[np.ndarray], columns: int = 3) -> np.ndarray:
 
 def evenly(frames: list[int], count: int) -> set[int]:
     """At most `count` of the frames, evenly taken, the first and the last among them."""
-    if len(frames) <= count:
-        return set(frames)
-    return {frames[round(i)] for i in np.linspace(0, len(frames) - 1, count)}
+    return {frames[i] for i in evenly_spaced(len(frames), count)}

@@ -42,14 +42,16 @@ class ImageAgreement:
         settings: ImageContourSettings,
     ):
         self.settings = settings
-        self._samples = LipSamples.of(*lip_rings(face, n_samples), neutral_mm)
+        self._samples = LipSamples.of(*lip_rings(face, n_samples), neutral_mm, face.triangles)
         self._anchors = face.landmarks[ANCHORS]
         self._eyes = face.landmarks[EYE_CORNERS]
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
         self._crossings = LipCrossings(face)
         self._occluding = OccludingContour.of(face)
-        lips = np.union1d(self._samples.points.vertices, self._occluding.points.vertices)
+        lips = np.union1d(
+            *(part.points.vertices(face.triangles) for part in (self._samples, self._occluding))
+        )
         self._lips = np.intersect1d(lips, integrator.free)
         self._solver = ConstraintSolver(integrator, np.union1d(lips, self._crossings.vertices))
 
@@ -103,7 +105,9 @@ class ImageAgreement:
         """`world_from_head` after the corrected heads are laid on the image."""
         turn = np.swapaxes(rotation, 1, 2)
         pivot = self._pivot @ turn + translation_mm
-        samples = np.stack([s.points.of(v) for s, v in zip(seen, corrected, strict=True)])
+        samples = np.stack(
+            [s.points.sample(v, s.triangles) for s, v in zip(seen, corrected, strict=True)]
+        )
         motion = repose_motion(
             corrected[:, self._anchors] @ turn + translation_mm[:, None],
             image.camera.project(coarse_mm[:, self._anchors]),
@@ -149,9 +153,7 @@ class ImageAgreement:
 
     def _seen(self, vertices, rotation, translation_mm, image, f) -> LipSamples:
         """Samples on the contours as they are seen: of the inner one, what hides the mouth now."""
-        pixels = image.camera.project(
-            self._occluding.points.of(vertices) @ rotation.T + translation_mm
-        )
+        pixels = image.camera.project(self._occluding.on(vertices) @ rotation.T + translation_mm)
         samples, points, _ = self._occluding.match(
             pixels, image.outer_px[f], image.inner_px[f], image.inner_found[f]
         )

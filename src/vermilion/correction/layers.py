@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from vermilion.geometry.deformation_gradients import deformation_gradients
-from vermilion.geometry.rotations import rotation_matrix, rotation_vector
+from vermilion.geometry.rotations import nearest_rotation, rotation_matrix, rotation_vector
 
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 
@@ -64,9 +64,7 @@ def polar_decomposition(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     regular = np.zeros(len(flat), dtype=np.bool_)
     _newton_polar(flat, rotations, regular)
     if not regular.all():
-        u, _, vt = np.linalg.svd(flat[~regular])
-        u[..., 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
-        rotations[~regular] = u @ vt
+        rotations[~regular] = nearest_rotation(flat[~regular])
     stretches = np.swapaxes(rotations, -1, -2) @ flat
     stretches = 0.5 * (stretches + np.swapaxes(stretches, -1, -2))
     return rotations.reshape(matrices.shape), stretches.reshape(matrices.shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from vermilion.correction.constraints import Rows
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.features.rings import Ring
 from vermilion.geometry.camera import Camera
-from vermilion.geometry.mesh_points import MeshPoints
+from vermilion.geometry.surface_points import SurfacePoints
 
 #: How far in one lip another lip may lie (mm), and how far apart they are set then.
 SLACK_MM, _APART_MM = 0.01, 0.005
@@ -22,25 +22,26 @@ class LipSamples:
 
     Attributes:
         points: m of them, on edges.
+        triangles: (T, 3) of the mesh.
         length_mm: (m,) of contour that each stands for, on the person's neutral.
     """
 
-    points: MeshPoints
+    points: SurfacePoints
+    triangles: np.ndarray
     length_mm: np.ndarray
 
-    def with_inner(self, samples: np.ndarray, points: MeshPoints) -> LipSamples:
+    def with_inner(self, samples: np.ndarray, points: SurfacePoints) -> LipSamples:
         """The same with inner samples (k,) at other points (k): those that form the contour now."""
-        vertices, weights = (
-            np.pad(part, ((0, 0), (0, points.vertices.shape[1] - part.shape[1])), mode=mode)
-            for part, mode in ((self.points.vertices, "edge"), (self.points.weights, "constant"))
-        )
         rows = len(self.points) // 2 + samples
-        vertices[rows], weights[rows] = points.vertices, points.weights
-        return LipSamples(MeshPoints(vertices, weights), self.length_mm)
+        triangle, barycentric = self.points.triangle.copy(), self.points.barycentric.copy()
+        triangle[rows], barycentric[rows] = points.triangle, points.barycentric
+        return replace(self, points=SurfacePoints(triangle, barycentric))
 
     @classmethod
-    def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
-        """Of both rings of a face, with lengths on a person's neutral (V, 3)."""
+    def of(
+        cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray, triangles: np.ndarray
+    ) -> LipSamples:
+        """Of both rings of a face (T, 3), with lengths on a person's neutral (V, 3)."""
         lengths = []
         for ring in (outer, inner):
             points = ring.points(neutral_mm)
@@ -50,7 +51,8 @@ class LipSamples:
             np.concatenate([getattr(ring, name) for ring in (outer, inner)])
             for name in ("start", "end", "fraction")
         )
-        return cls(MeshPoints.on_edges(*places), np.concatenate(lengths))
+        points = SurfacePoints.on_edges(*places, triangles)
+        return cls(points, triangles, np.concatenate(lengths))
 
 
 def contour_rows(
@@ -72,13 +74,13 @@ def contour_rows(
         robust_mm: a point this far off counts half.
     """
     points_px, normals, known = lines
-    world = samples.points.of(vertices_mm) @ rotation.T + translation_mm
+    world = samples.points.sample(vertices_mm, samples.triangles) @ rotation.T + translation_mm
     across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
     counts = weight * samples.length_mm / (1.0 + (off_mm / robust_mm) ** 2)
     rows = Rows(
-        samples.points.vertices, samples.points.weights, across / px_per_mm[:, None], off_mm,
+        samples.points.corners(samples.triangles), samples.points.barycentric, across / px_per_mm[:, None], off_mm,
         1.0 / counts, np.zeros(len(off_mm), dtype=bool),
     )  # fmt: skip
     return rows[known & np.isfinite(off_mm)]
@@ -113,8 +115,8 @@ def touch_rows(
     inner = len(samples.points) - n  # where the inner ring begins
     upper, lower = inner + upper[touching], inner + lower[touching]
     above, below = samples.points[upper], samples.points[lower]
-    vertices = np.concatenate([above.vertices, below.vertices], axis=1)
-    coefficients = np.concatenate([above.weights, -below.weights], axis=1)
+    vertices = np.concatenate([p.corners(samples.triangles) for p in (above, below)], axis=1)
+    coefficients = np.concatenate([above.barycentric, -below.barycentric], axis=1)
     vertical = np.array([0.0, 1.0, 0.0]) - view[1] * view
     axes = np.stack([view, vertical / np.linalg.norm(vertical)])
     directions = np.repeat(axes, len(upper), axis=0)

@@ -8,6 +8,7 @@ from vermilion.correction.take_layers import TakeLayers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.geometry.camera import portrait_camera
 from vermilion.imaging.draw import colour_map, draw_mesh, label, tile
+from vermilion.storage.frames import evenly_spaced
 
 STRENGTH = 0.8  # length of nine numbers shown in the hottest colour
 
@@ -21,7 +22,7 @@ def layers_overlay(
     good = np.flatnonzero(made.valid)
     if not len(good):
         return label(grey, "no valid frame in this chunk")
-    shown = good[np.unique(np.linspace(0, len(good) - 1, n_shown).round().astype(int))]
+    shown = good[evenly_spaced(len(good), n_shown)]
     triangles = correspondence.coarse_triangles
     bound = triangles[correspondence.vertices.bound[triangles].all(axis=1)]
     panels = []

@@ -11,7 +11,8 @@ import numpy as np
 
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.geometry.head_frame import align_frames, head_from_world
+from vermilion.geometry.alignment import align_frames
+from vermilion.geometry.head_frame import head_from_world
 from vermilion.geometry.mesh import mesh_corners, vertex_areas
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.quality import QualityRow
@@ -64,15 +65,16 @@ def take_layers(
     """
     coarse = head_from_world(coarse_mm, rotation, translation_mm)
     accurate = correspondence.on_coarse(np.asarray(accurate_mm))
-    fixed, trim = correspondence.rigid, 0.2
+    fixed, trimming = correspondence.rigid, {"trim": 0.2, "rounds": 2}
     if face is not None:
-        fixed, trim = _face_outside_mask(correspondence, face), 0.0
-    if head == "frame":
-        accurate, alignment_mm = align_frames(accurate, coarse, fixed, trim)
-    else:
-        neutral = correspondence.on_coarse(accurate_neutral_mm)
-        neutral, _ = align_frames(neutral[None], correspondence.coarse_neutral_mm, fixed, trim)
-        accurate, alignment_mm = align_frames(accurate, neutral[0], fixed, trim)
+        fixed, trimming = _face_outside_mask(correspondence, face), {}
+    target = coarse
+    if head == "neutral":
+        neutral = correspondence.on_coarse(accurate_neutral_mm)[None]
+        placed = align_frames(neutral, correspondence.coarse_neutral_mm, fixed, **trimming)
+        target = placed.apply(neutral)[0]
+    alignment = align_frames(accurate, target, fixed, **trimming)
+    accurate, alignment_mm = alignment.apply(accurate), alignment.error_mm
     triangles = correspondence.coarse_triangles[correspondence.mask]
     corners = np.unique(triangles)
     valid = np.isfinite(accurate[:, corners]).all(axis=(1, 2))

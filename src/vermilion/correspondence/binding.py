@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
+from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, adjacency, triangle_normals, vertex_normals
-from vermilion.geometry.surface_points import SurfaceMap, closest_on_surface
+from vermilion.geometry.surface_points import SurfacePoints
 
 ROUNDS_A_RING = 10
 
@@ -19,7 +23,7 @@ def bind_vertices(
     sides: np.ndarray | None = None,
     triangle_sides: np.ndarray | None = None,
     rounds: int = 100,
-) -> tuple[SurfaceMap, np.ndarray]:
+) -> SurfacePoints:
     """Bind every vertex to its closest compatible point; folds are relaxed along the surface.
 
     The closest points of neighbours can lie in another order than the neighbours themselves, above
@@ -29,66 +33,88 @@ def bind_vertices(
     lies next to them has moved.
 
     Args:
-        registered: near the accurate mesh.
+        registered: V vertices near the accurate mesh, mm.
+        accurate: T triangles, in the same frame, mm.
         max_distance_mm: vertices further from their point are bound to nothing.
-        max_angle_deg, sides, triangle_sides: see `closest_on_surface`.
+        max_angle_deg: between the normals of a vertex and of its triangle.
+        sides, triangle_sides: (V,), (T,) lips, +1 upper, -1 lower, 0 neither; None: unknown.
         rounds: of relaxation at most.
 
     Returns:
-        (map, distance (V,) mm between vertex and point, infinite if unbound).
+        V points of the accurate mesh with their distance_mm to the registered vertices.
     """
-    normals = vertex_normals(registered.vertices_mm, registered.triangles)
-    near = adjacency(registered.triangles, len(normals)).tocsr()
-    found, distance = closest_on_surface(
-        registered.vertices_mm,
-        accurate,
-        normals=normals,
-        max_angle_deg=max_angle_deg,
-        sides=sides,
-        triangle_sides=triangle_sides,
+    surface = Surface(accurate.vertices_mm, accurate.triangles)
+
+    def search(rows: np.ndarray, points_mm: np.ndarray, normals: np.ndarray) -> SurfacePoints:
+        cosine = np.cos(np.deg2rad(max_angle_deg))
+        of_rows = None if sides is None else sides[rows]
+        return surface.closest(points_mm, normals, cosine, of_rows, triangle_sides)
+
+    vertices = registered.vertices_mm
+    normals = vertex_normals(vertices, registered.triangles)
+    found = search(np.arange(len(vertices)), vertices, normals)
+    found = found.restricted(found.distance_mm <= max_distance_mm)
+    found = _without_folds(found, registered.triangles, accurate, search, rounds)
+    distance = np.linalg.norm(
+        found.sample(accurate.vertices_mm, accurate.triangles) - vertices, axis=1
     )
-    triangle = np.where(distance <= max_distance_mm, found.triangle, -1)
-    found = SurfaceMap(triangle, found.barycentric.copy())
-    normals_there = vertex_normals(accurate.vertices_mm, accurate.triangles)
+    return replace(found, distance_mm=np.where(found.bound, distance, np.inf))
+
+
+def _without_folds(
+    found: SurfacePoints,
+    triangles: np.ndarray,
+    accurate: Mesh,
+    search: Callable[[np.ndarray, np.ndarray, np.ndarray], SurfacePoints],
+    rounds: int,
+) -> SurfacePoints:
+    """Slide the corners of flipped triangles (T, 3), and what lies about them, on the surface.
+
+    Args:
+        search: compatible closest points of some rows, from their points and normals.
+    """
+    near = adjacency(triangles, len(found)).tocsr()
+    normals = vertex_normals(accurate.vertices_mm, accurate.triangles)
     local = found
-    for index in range(rounds + 1):
-        points = found.sample(accurate.vertices_mm, accurate.triangles)
-        folded = flipped_triangles(found, registered.triangles, accurate)
+    for index in range(rounds):
+        folded = flipped_triangles(found, triangles, accurate)
         if not folded.any():
-            break
+            return found
         if index == ROUNDS_A_RING:
-            local = SurfaceMap(found.triangle.copy(), found.barycentric.copy())
-        if index == rounds:  # no room helps: what little was moved at first is kept
-            found = local
-            break
-        pull = np.zeros(len(normals))
-        pull[registered.triangles[folded]] = 0.5
+            local = found
+        pull = np.zeros(len(found))
+        pull[triangles[folded]] = 0.5
         for _ in range(1 + index // ROUNDS_A_RING):  # stubborn folds need more room
             pull = np.maximum(pull, 0.5 * near.multiply(pull).max(axis=1).toarray().ravel())
         moving = np.flatnonzero((pull > 0) & found.bound)
         ring = near[moving]
+        points = found.sample(accurate.vertices_mm, accurate.triangles)
         count = np.maximum(ring @ found.bound.astype(float), 1.0)
         middle = (ring @ np.nan_to_num(points)) / count[:, None]
-        slid, _ = closest_on_surface(
-            points[moving] + pull[moving, None] * (middle - points[moving]),
-            accurate,
-            normals=found.sample(normals_there, accurate.triangles)[moving],
-            max_angle_deg=max_angle_deg,
-            sides=None if sides is None else sides[moving],
-            triangle_sides=triangle_sides,
+        step = pull[moving, None] * (middle - points[moving])
+        slid = search(
+            moving, points[moving] + step, found.sample(normals, accurate.triangles)[moving]
         )
-        kept = slid.bound
-        found.triangle[moving[kept]] = slid.triangle[kept]
-        found.barycentric[moving[kept]] = slid.barycentric[kept]
-    points = found.sample(accurate.vertices_mm, accurate.triangles)
-    distance = np.linalg.norm(points - registered.vertices_mm, axis=1)
-    return found, np.where(found.bound, distance, np.inf)
+        # A point that would end farther from its goal than it is now stays.
+        slid = slid.restricted(slid.distance_mm <= np.linalg.norm(step, axis=1))
+        triangle, barycentric = found.triangle.copy(), found.barycentric.copy()
+        triangle[moving[slid.bound]] = slid.triangle[slid.bound]
+        barycentric[moving[slid.bound]] = slid.barycentric[slid.bound]
+        found = SurfacePoints(triangle, barycentric)
+    # Where no room helps, what little was moved at first is kept.
+    return local if flipped_triangles(found, triangles, accurate).any() else found
 
 
-def flipped_triangles(found: SurfaceMap, triangles: np.ndarray, accurate: Mesh) -> np.ndarray:
-    """Triangles (T, 3) between bound points that face against the surface they lie on, (T,) bool.
+def flipped_triangles(found: SurfacePoints, triangles: np.ndarray, accurate: Mesh) -> np.ndarray:
+    """Triangles between bound points that face against the surface they lie on.
 
-    A triangle with an unbound corner has no side.
+    Args:
+        found: V points of the accurate mesh.
+        triangles: (T, 3) between them.
+        accurate: the surface.
+
+    Returns:
+        (T,) bool; a triangle with an unbound corner has no side and does not count.
     """
     whole = found.bound[triangles].all(axis=1)
     points = np.nan_to_num(found.sample(accurate.vertices_mm, accurate.triangles))

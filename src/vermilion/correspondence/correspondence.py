@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,12 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
-from vermilion.correspondence.lip_sides import lip_sides
+from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, topology_hash, triangle_normals
-from vermilion.geometry.registration import register, sides_of_triangles
-from vermilion.geometry.surface_points import SurfaceMap, closest_on_surface
+from vermilion.geometry.registration import LandmarkTargets, Schedule, register
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 
@@ -37,7 +39,7 @@ class Correspondence:
         coarse_neutral_mm: (V, 3) C at the neutral, in its head frame.
     """
 
-    vertices: SurfaceMap
+    vertices: SurfacePoints
     triangles: np.ndarray
     distance_mm: np.ndarray
     mask: np.ndarray
@@ -52,7 +54,14 @@ class Correspondence:
         return topology_hash(self.coarse_triangles)
 
     def on_coarse(self, accurate_mm: np.ndarray) -> np.ndarray:
-        """H on the topology of C: (..., V_H, 3) -> (..., V, 3) float64, NaN where H is absent."""
+        """H on the topology of C.
+
+        Args:
+            accurate_mm: (..., V_H, 3) in any frame, mm.
+
+        Returns:
+            (..., V, 3) float64 in that frame; NaN where H is absent.
+        """
         return self.vertices.sample(accurate_mm, self.accurate_triangles)
 
     def save(self, path: str | Path) -> None:
@@ -85,7 +94,9 @@ class Correspondence:
                 path=path,
             )
         return cls(
-            vertices=SurfaceMap(arrays["vertex_triangle"], arrays["vertex_barycentric"]),
+            vertices=SurfacePoints(
+                arrays["vertex_triangle"], arrays["vertex_barycentric"], arrays["distance_mm"]
+            ),
             triangles=arrays["triangle_triangle"],
             distance_mm=arrays["distance_mm"],
             mask=arrays["mask"],
@@ -96,21 +107,51 @@ class Correspondence:
         )
 
 
+@dataclass(frozen=True)
+class CorrespondenceSettings:
+    """See `vermilion.config.correspondence` for meanings and units."""
+
+    landmark_weight: float
+    wavelengths_mm: Sequence[float]
+    search_distance_mm: float
+    max_distance_mm: float
+    max_angle_deg: float
+    mask_radius_mm: float
+    eye_gap_mm: float
+
+
+@dataclass(frozen=True)
+class MarkedMesh:
+    """A neutral and what is known of it.
+
+    Attributes:
+        mesh: V vertices, mm.
+        landmarks: N landmarks, the same ones for both meshes; unbound where unknown.
+        regions: names of `FaceModel.regions` -> (V,) bool; None for another tracker's mesh.
+    """
+
+    mesh: Mesh
+    landmarks: SurfacePoints
+    regions: Mapping[str, np.ndarray] | None = None
+
+    @property
+    def sides(self) -> np.ndarray | None:
+        """(V,) lip of each vertex, +1 upper, -1 lower, 0 neither; None without regions."""
+        return None if self.regions is None else lip_sides_by_distance(self.mesh, self.regions)
+
+    @property
+    def triangle_sides(self) -> np.ndarray | None:
+        """(T,) lip of each triangle, likewise."""
+        sides = self.sides
+        return None if sides is None else triangle_sides(self.mesh.triangles, sides)
+
+
 def find_correspondence(
-    coarse: Mesh,
-    accurate: Mesh,
-    landmarks_coarse: SurfaceMap,
-    landmarks_accurate: SurfaceMap,
+    coarse: MarkedMesh,
+    accurate: MarkedMesh,
     mouth_centre_mm: np.ndarray,
     eyelids_mm: np.ndarray,
-    *,
-    coarse_regions: Mapping[str, np.ndarray] | None = None,
-    accurate_regions: Mapping[str, np.ndarray] | None = None,
-    mask_radius_mm: float = 95.0,
-    eye_gap_mm: float = 10.0,
-    max_distance_mm: float = 4.0,
-    max_angle_deg: float = 70.0,
-    **registration,
+    settings: CorrespondenceSettings,
 ) -> tuple[Correspondence, Mesh]:
     """Register the neutrals and bind every coarse vertex and triangle to the accurate mesh.
 
@@ -119,101 +160,131 @@ def find_correspondence(
     Args:
         coarse: C at the neutral, in its head frame.
         accurate: H at the neutral, in any frame.
-        landmarks_coarse, landmarks_accurate: the same landmarks on both meshes.
         mouth_centre_mm: (3,) in C's frame.
         eyelids_mm: (N, 3) points in C's frame from which the mask keeps away; there may be none.
-        coarse_regions, accurate_regions: regions of `FaceModel`, or None for another tracker's mesh.
-        mask_radius_mm: the mask's reach from the mouth's centre.
-        eye_gap_mm: the mask's distance from points of the eyelids.
-        max_distance_mm: between a registered vertex and its point of H.
-        registration: further settings of `register`.
+        settings: of registration, binding and mask.
 
     Returns:
-        (the correspondence, C registered over H).
+        the correspondence, and C registered over H, in H's frame.
+
+    Raises:
+        ValueError: fewer than six landmark pairs, or no matched triangle near the mouth.
     """
-    sides_coarse = None if coarse_regions is None else lip_sides(coarse, coarse_regions)
-    sides_accurate = None if accurate_regions is None else lip_sides(accurate, accurate_regions)
-    registered = register(
-        coarse,
-        accurate,
-        landmarks_coarse,
-        landmarks_accurate,
-        sides_coarse=sides_coarse,
-        sides_accurate=sides_accurate,
-        max_angle_deg=max_angle_deg,
-        **registration,
+    triangles = coarse.mesh.triangles
+    registered = register_neutral(coarse, accurate, settings)
+    vertices = bind_vertices(
+        registered,
+        accurate.mesh,
+        max_distance_mm=settings.max_distance_mm,
+        max_angle_deg=settings.max_angle_deg,
+        sides=coarse.sides,
+        triangle_sides=accurate.triangle_sides,
     )
-    triangle_sides = (
-        None if sides_accurate is None else sides_of_triangles(accurate, sides_accurate)
-    )
-    search = {"max_angle_deg": max_angle_deg, "triangle_sides": triangle_sides}
-    vertices, distance = bind_vertices(
-        registered, accurate, max_distance_mm=max_distance_mm, sides=sides_coarse, **search
-    )
-    bound_mm = vertices.sample(accurate.vertices_mm, accurate.triangles)
-    whole = vertices.bound[coarse.triangles].all(axis=1)
-    bound = Mesh(np.nan_to_num(bound_mm), coarse.triangles)
-    triangles, _ = closest_on_surface(
-        bound.vertices_mm[coarse.triangles].mean(axis=1),
-        accurate,
-        normals=triangle_normals(bound.vertices_mm, coarse.triangles),
-        sides=None if sides_coarse is None else sides_of_triangles(coarse, sides_coarse),
-        **search,
-    )
-    matched = (
-        whole & (triangles.triangle >= 0) & ~flipped_triangles(vertices, coarse.triangles, accurate)
-    )
-    mask = mouth_mask(
-        coarse, mouth_centre_mm, mask_radius_mm, eyelids_mm, eye_gap_mm, matched, coarse_regions
-    )
-    in_mask = np.zeros(len(distance), dtype=bool)
-    in_mask[coarse.triangles[mask]] = True
-    rest = vertices.bound & ~in_mask
-    if coarse_regions is not None and (rest & coarse_regions["rigid"]).sum() >= 30:
-        rest = rest & coarse_regions["rigid"]
+    owner = _triangles_of(vertices, coarse, accurate, settings.max_angle_deg)
+    flipped = flipped_triangles(vertices, triangles, accurate.mesh)
+    mask = mouth_mask(coarse, mouth_centre_mm, eyelids_mm, (owner >= 0) & ~flipped, settings)
+    rest = vertices.bound.copy()
+    rest[triangles[mask]] = False
+    if coarse.regions is not None and (rest & coarse.regions["rigid"]).sum() >= 30:
+        rest = rest & coarse.regions["rigid"]
     correspondence = Correspondence(
         vertices=vertices,
-        triangles=np.where(whole, triangles.triangle, -1),
-        distance_mm=distance,
+        triangles=owner,
+        distance_mm=vertices.distance_mm,
         mask=mask,
         rigid=rest,
-        accurate_triangles=accurate.triangles,
-        coarse_triangles=coarse.triangles,
-        coarse_neutral_mm=coarse.vertices_mm,
+        accurate_triangles=accurate.mesh.triangles,
+        coarse_triangles=triangles,
+        coarse_neutral_mm=coarse.mesh.vertices_mm,
     )
     return correspondence, registered
 
 
-def mouth_mask(
-    coarse: Mesh,
-    mouth_centre_mm: np.ndarray,
-    radius_mm: float,
-    eyelids_mm: np.ndarray,
-    eye_gap_mm: float,
-    matched: np.ndarray,
-    regions: Mapping[str, np.ndarray] | None = None,
+def register_neutral(
+    coarse: MarkedMesh, accurate: MarkedMesh, settings: CorrespondenceSettings
+) -> Mesh:
+    """The coarse neutral laid over the accurate one, in the accurate one's frame, mm.
+
+    Landmark pairs with an unbound end are left out; the frames of the two need not agree.
+
+    Raises:
+        ValueError: fewer than six landmark pairs.
+    """
+    pairs = coarse.landmarks.bound & accurate.landmarks.bound
+    if pairs.sum() < 6:
+        raise ValueError(f"registration needs at least 6 landmark pairs, got {int(pairs.sum())}")
+    source, wanted = (
+        marked.landmarks[pairs].sample(marked.mesh.vertices_mm, marked.mesh.triangles)
+        for marked in (coarse, accurate)
+    )
+    placed = similarity_alignment(source, wanted).apply(coarse.mesh.vertices_mm)
+    weights = np.full(len(wanted), settings.landmark_weight)
+    registered, _ = register(
+        coarse.mesh.with_vertices(placed),
+        accurate.mesh,
+        LandmarkTargets(coarse.landmarks[pairs], wanted, weights),
+        Schedule(settings.wavelengths_mm, settings.search_distance_mm, settings.max_angle_deg),
+        sides=coarse.sides,
+        triangle_sides=accurate.triangle_sides,
+    )
+    return registered
+
+
+def _triangles_of(
+    vertices: SurfacePoints, coarse: MarkedMesh, accurate: MarkedMesh, max_angle_deg: float
 ) -> np.ndarray:
-    """Ids of the matched triangles within `radius_mm` of the mouth's centre, in one piece.
+    """H's triangle at the middle of each C triangle, (T,); -1 where a corner is unbound."""
+    mesh, triangles = accurate.mesh, coarse.mesh.triangles
+    bound_mm = np.nan_to_num(vertices.sample(mesh.vertices_mm, mesh.triangles))
+    found = Surface(mesh.vertices_mm, mesh.triangles).closest(
+        bound_mm[triangles].mean(axis=1),
+        triangle_normals(bound_mm, triangles),
+        np.cos(np.deg2rad(max_angle_deg)),
+        coarse.triangle_sides,
+        accurate.triangle_sides,
+    )
+    return np.where(vertices.bound[triangles].all(axis=1), found.triangle, -1)
+
+
+def mouth_mask(
+    coarse: MarkedMesh,
+    mouth_centre_mm: np.ndarray,
+    eyelids_mm: np.ndarray,
+    matched: np.ndarray,
+    settings: CorrespondenceSettings,
+) -> np.ndarray:
+    """The matched triangles within `mask_radius_mm` of the mouth's centre, in one piece.
 
     Args:
-        eyelids_mm, eye_gap_mm: no vertex lies as near to one of these points (N, 3).
-        matched: (T,) bool, triangles whose corners are bound.
-        regions: with them, the inside of the mouth, teeth and eyes are left out.
+        coarse: T triangles; with regions, the inside of the mouth, teeth and eyes are left out.
+        mouth_centre_mm: (3,) in the mesh's frame.
+        eyelids_mm: (N, 3) in the mesh's frame; no vertex of the mask lies within `eye_gap_mm`.
+        matched: (T,) bool, triangles that may belong to the mask.
+        settings: `mask_radius_mm` and `eye_gap_mm`.
+
+    Returns:
+        (M,) int32 triangle ids, ascending.
+
+    Raises:
+        ValueError: there is no such triangle.
     """
-    near = np.linalg.norm(coarse.vertices_mm - mouth_centre_mm, axis=1) <= radius_mm
+    vertices, triangles = coarse.mesh.vertices_mm, coarse.mesh.triangles
+    near = np.linalg.norm(vertices - mouth_centre_mm, axis=1) <= settings.mask_radius_mm
     if len(eyelids_mm):
-        near &= cKDTree(eyelids_mm).query(coarse.vertices_mm)[0] > eye_gap_mm
-    if regions is not None:
+        near &= cKDTree(eyelids_mm).query(vertices)[0] > settings.eye_gap_mm
+    if coarse.regions is not None:
+        regions = coarse.regions
         near &= ~(regions["mouth_inner"] | regions["teeth"] | regions["eyes"])
-    inside = np.flatnonzero(near[coarse.triangles].all(axis=1) & matched)
+    inside = np.flatnonzero(near[triangles].all(axis=1) & matched)
     if not len(inside):
         raise ValueError(
-            f"no triangle of the coarse mesh within {radius_mm} mm of the mouth is matched"
+            f"no triangle of the coarse mesh within {settings.mask_radius_mm} mm of the mouth is "
+            "matched"
         )
-    corners = coarse.triangles[inside]
+    corners = triangles[inside]
     rows, columns = corners[:, [0, 1, 2]].ravel(), corners[:, [1, 2, 0]].ravel()
-    n_vertices = len(coarse.vertices_mm)
-    graph = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n_vertices,) * 2)
+    shape = (len(vertices),) * 2
+    graph = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=shape)
     _, part = csgraph.connected_components(graph, directed=False)
     part = part[corners[:, 0]]
     return inside[part == np.bincount(part).argmax()].astype(np.int32)

@@ -7,21 +7,24 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.geometry.raycast import RayCaster
-from vermilion.geometry.surface_points import SurfaceMap
-
-#: Points of the 66-point scheme that mark the face's outline: they slide over the surface.
-JAW = np.arange(17)
-LIPS = np.arange(48, 66)
-EYES = np.arange(36, 48)
+from vermilion.geometry.surface_points import SurfacePoints
+from vermilion.landmarks.scheme import JAW
 
 
 def back_project(
     points_px: np.ndarray, camera: Camera, mesh: Mesh, max_grazing_deg: float = 70.0
-) -> SurfaceMap:
-    """Where the rays of pixels (N, 2) meet a mesh in the camera's world.
+) -> SurfacePoints:
+    """Where the rays of pixels meet a mesh.
 
-    A point is unbound where its ray misses the mesh or meets it at a grazing angle (more than
-    `max_grazing_deg` off the normal), where a pixel of error is many millimetres on the surface.
+    Args:
+        points_px: (N, 2), NaN where unknown.
+        camera: of the pixels.
+        mesh: in the camera's world, mm.
+        max_grazing_deg: a ray that meets the mesh further off its normal is not used: there a pixel
+            of error is many millimetres on the surface.
+
+    Returns:
+        N points; unbound where a ray misses the mesh or grazes it.
     """
     finite = np.isfinite(points_px).all(axis=1)
     origins, directions = camera.rays(np.where(finite[:, None], points_px, 0.0))
@@ -30,11 +33,9 @@ def back_project(
     facing = -(normals * directions).sum(axis=1)
     good = finite & hits.hit & (facing > np.cos(np.deg2rad(max_grazing_deg)))
     triangle = np.where(good, hits.triangle, -1).astype(np.int32)
-    return SurfaceMap(triangle, hits.barycentric.astype(np.float64))
+    return SurfacePoints(triangle, hits.barycentric.astype(np.float64))
 
 
-def inner_features(points: SurfaceMap) -> SurfaceMap:
+def inner_features(points: SurfacePoints) -> SurfacePoints:
     """The same without the jaw's outline, which is no fixed place of the skin."""
-    triangle = points.triangle.copy()
-    triangle[JAW] = -1
-    return SurfaceMap(triangle, points.barycentric)
+    return points.restricted(~np.isin(np.arange(len(points)), JAW))

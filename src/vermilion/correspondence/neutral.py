@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from vermilion.correspondence.binding import flipped_triangles
-from vermilion.correspondence.correspondence import Correspondence, find_correspondence
-from vermilion.correspondence.landmarks import EYES, LIPS, back_project, inner_features
+from vermilion.correspondence.correspondence import (
+    Correspondence,
+    CorrespondenceSettings,
+    MarkedMesh,
+    find_correspondence,
+)
+from vermilion.correspondence.landmarks import back_project, inner_features
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.closest_points import closest_barycentric
 from vermilion.geometry.head_frame import head_from_world
 from vermilion.geometry.mesh import Mesh
-from vermilion.geometry.surface_points import SurfaceMap, at_vertices, closest_barycentric
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT, MOUTH
 from vermilion.storage.errors import InputError
 from vermilion.storage.quality import QualityRow
 from vermilion.tracking.result import TrackedTake
@@ -82,43 +90,26 @@ def correspond_neutrals(
     neutral: Neutral,
     tracker: FaceModel,
     template: FaceModel,
-    *,
-    landmarks: str = "image",
-    search_distance_mm: float = 25.0,
-    max_distance_mm: float = 4.0,
-    **settings,
-) -> tuple[Correspondence, Mesh, tuple[SurfaceMap, SurfaceMap]]:
+    landmarks: Literal["image", "model"],
+    settings: CorrespondenceSettings,
+) -> tuple[Correspondence, Mesh, tuple[SurfacePoints, SurfacePoints]]:
     """Find the correspondence of a subject.
 
     Args:
+        neutral: the take's first frame.
         tracker, template: models of C's and H's topology, for regions.
         landmarks: `image` or `model`, see the configuration.
-        search_distance_mm, max_distance_mm: during registration, and once registered.
-        settings: others of `find_correspondence` and `register`.
+        settings: of `find_correspondence`.
 
     Returns:
-        (correspondence, C registered over H in H's world, landmarks on C and H).
+        the correspondence, C registered over H in H's world, and the landmarks on C and on H.
 
     Raises:
         InputError: too few landmarks on both meshes, or no mouth in common.
     """
-    coarse, accurate = neutral.coarse, neutral.accurate
-    seen = [
-        inner_features(back_project(neutral.points_px, neutral.camera, mesh))
-        for mesh in (coarse, accurate)
-    ]
-    if landmarks == "model":
-        seen = [
-            inner_features(at_vertices(model.landmarks, model.triangles))
-            for model in (tracker, template)
-        ]
-    in_head = coarse.with_vertices(
-        head_from_world(
-            coarse.vertices_mm[None], neutral.rotation[None], neutral.translation_mm[None]
-        )[0]
-    )
-    points = seen[0].sample(in_head.vertices_mm, coarse.triangles)
-    lips, lids = points[LIPS], points[EYES]
+    coarse, accurate = _marked(neutral, tracker, template, landmarks)
+    points = coarse.landmarks.sample(coarse.mesh.vertices_mm, coarse.mesh.triangles)
+    lips, lids = points[MOUTH], points[np.concatenate([EYE_RIGHT, EYE_LEFT])]
     place = {"subject": neutral.subject, "take": neutral.take}
     if not np.isfinite(lips).all(axis=1).any():
         raise InputError(
@@ -127,18 +118,10 @@ def correspond_neutrals(
             "Look at the take's tracking overlay: the mesh does not lie over the face.",
             **place,
         )
+    lids = lids[np.isfinite(lids).all(axis=1)]
     try:
         found, registered = find_correspondence(
-            in_head,
-            accurate,
-            *seen,
-            np.nanmean(lips, axis=0),
-            lids[np.isfinite(lids).all(axis=1)],
-            coarse_regions=tracker.regions,
-            accurate_regions=template.regions,
-            max_distance_mm=max_distance_mm,
-            search_distance_mm=search_distance_mm,
-            **settings,
+            coarse, accurate, np.nanmean(lips, axis=0), lids, settings
         )
     except ValueError as error:
         raise InputError(
@@ -147,7 +130,24 @@ def correspond_neutrals(
             "Look at the take's tracking and multiview overlays.",
             **place,
         ) from error
-    return found, registered, (seen[0], seen[1])
+    return found, registered, (coarse.landmarks, accurate.landmarks)
+
+
+def _marked(
+    neutral: Neutral, tracker: FaceModel, template: FaceModel, landmarks: str
+) -> tuple[MarkedMesh, MarkedMesh]:
+    """C in its head frame and H in the world, with landmarks and regions."""
+    marked = []
+    for mesh, model in ((neutral.coarse, tracker), (neutral.accurate, template)):
+        if landmarks == "model":
+            seen = SurfacePoints.at_vertices(model.landmarks, model.triangles)
+        else:
+            seen = back_project(neutral.points_px, neutral.camera, mesh)
+        marked.append(MarkedMesh(mesh, inner_features(seen), model.regions))
+    head = head_from_world(
+        neutral.coarse.vertices_mm[None], neutral.rotation[None], neutral.translation_mm[None]
+    )
+    return replace(marked[0], mesh=neutral.coarse.with_vertices(head[0])), marked[1]
 
 
 def quality_of(found: Correspondence, registered: Mesh, accurate: Mesh, frame: int) -> QualityRow:

@@ -7,7 +7,7 @@ import numpy as np
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import Mesh
-from vermilion.geometry.surface_points import SurfaceMap
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, label, tile
 
 SCALE_MM = 3.0
@@ -19,7 +19,7 @@ def correspondence_overlay(
     coarse_world: Mesh,
     accurate_world: Mesh,
     registered: Mesh,
-    landmarks: tuple[SurfaceMap, SurfaceMap],
+    landmarks: tuple[SurfacePoints, SurfacePoints],
     correspondence: Correspondence,
 ) -> np.ndarray:
     """Four panels, (h, w, 3) uint8: both meshes' landmarks, the mask, the distances, H on C.

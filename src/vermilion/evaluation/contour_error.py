@@ -50,7 +50,7 @@ def contour_error(
         seen = outer[np.isfinite(outer).all(axis=1)]
         distances = [distance_to_polyline(seen, camera.project(vertices[outer_loop]), closed=True)]
         if occluding is not None and np.isfinite(outer).all():
-            pixels = camera.project(occluding.points.of(vertices))
+            pixels = camera.project(occluding.on(vertices))
             known = np.isfinite(inner).all(axis=1)
             samples, points, up = occluding.match(pixels, outer, inner, known)
             distances.append(np.abs((inner[samples] - pixels[points]) @ up))

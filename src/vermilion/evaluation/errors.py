@@ -39,7 +39,7 @@ class ClipSums:
 
 
 def vertex_errors(aligned_mm: np.ndarray, reference: Reference) -> np.ndarray:
-    """Distance of each vertex to its corresponding point, (F, V) mm; NaN where there is none."""
+    """Distance of each vertex of aligned_mm (F, V, 3) to its point, (F, V) mm; NaN without one."""
     return np.linalg.norm(aligned_mm - reference.points_mm, axis=2)
 
 
@@ -74,7 +74,15 @@ def surface_errors(
 
 
 def second_differences(sequence_mm: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """|x[f-1] - 2 x[f] + x[f+1]|, (F, V) mm; NaN where a neighbouring frame is missing."""
+    """|x[f-1] - 2 x[f] + x[f+1]| of a sequence.
+
+    Args:
+        sequence_mm: (F, V, 3), any world, mm.
+        frames: (F,) frame numbers.
+
+    Returns:
+        (F, V) mm; NaN where a neighbouring frame is missing.
+    """
     result = np.full(sequence_mm.shape[:2], np.nan)
     if len(frames) < 3:
         return result
@@ -90,7 +98,13 @@ def sums_of_errors(
     regions: Regions,
     clips: np.ndarray,
 ) -> ClipSums:
-    """Sums behind vertex and surface errors, of (F, V) errors and the clip of each frame (F,)."""
+    """Sums behind vertex and surface errors.
+
+    Args:
+        vertex_mm, surface_mm: (F, V) errors, mm; NaN does not count.
+        regions: of the V vertices.
+        clips: (F,) clip of each frame.
+    """
     sums = {}
     for region, weights in regions.weights.items():
         sums[f"{region}.weight"], sums[f"{region}.error"] = weighted_sums(vertex_mm, weights, clips)
@@ -109,7 +123,15 @@ def sums_of_jitter(
     regions: Regions,
     clips: np.ndarray,
 ) -> ClipSums:
-    """Sums behind `jitter_mm`: second differences of the result minus those of the reference."""
+    """Sums behind `jitter_mm`: second differences of the result minus those of the reference.
+
+    Args:
+        aligned_mm: (F, V, 3) in the reference's world, mm.
+        reference: of the same frames.
+        frames: (F,) frame numbers.
+        regions: of the V vertices.
+        clips: (F,) clip of each frame.
+    """
     excess = second_differences(aligned_mm, frames) - second_differences(
         reference.points_mm, frames
     )
@@ -121,7 +143,7 @@ def sums_of_jitter(
 
 
 def sums_of_drift(drift_mm: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
-    """Sums behind `drift_mm`, of (F, V) mm; NaN does not count."""
+    """Sums behind `drift_mm`, of drift_mm (F, V), by clips (F,); NaN does not count."""
     sums = {}
     for region, weights in regions.weights.items():
         weight, total = weighted_sums(drift_mm, weights, clips)
@@ -135,7 +157,13 @@ def sums_of_aperture(
     clips: np.ndarray,
     tolerances: LipTolerances,
 ) -> ClipSums:
-    """Sums behind `aperture_error_mm` and `false_open_rate`, of gaps (F, columns) mm."""
+    """Sums behind `aperture_error_mm` and `false_open_rate`.
+
+    Args:
+        result_gaps, reference_gaps: (F, columns) mm, of `lip_gaps`.
+        clips: (F,) clip of each frame.
+        tolerances: when lips touch and gape.
+    """
     difference = np.abs(aperture_mm(result_gaps) - aperture_mm(reference_gaps))
     known = np.isfinite(difference)
     touch = known & (_widest(reference_gaps) <= tolerances.touch_mm)
@@ -156,7 +184,16 @@ def gaps_in_head(
     sides: np.ndarray,
     columns: np.ndarray,
 ) -> np.ndarray:
-    """`lip_gaps` of (F, V, 3) in a world whose rotations to the head frame are (F, 3, 3)."""
+    """`lip_gaps` of points in another world.
+
+    Args:
+        points_mm: (F, V, 3) in the world, mm.
+        head_rotations: (F, 3, 3) from it to the head frame.
+        sides, columns: (V,) see `lip_gaps`.
+
+    Returns:
+        (F, columns) mm.
+    """
     return lip_gaps(np.matmul(points_mm, head_rotations.transpose(0, 2, 1)), sides, columns)
 
 
@@ -174,6 +211,8 @@ def sums_of_moving_errors(
     Args:
         sequence_mm: (F, V, 3) aligned to the reference.
         head_rotations: (F, 3, 3) from the reference's world to the head frame.
+        regions: of the V vertices.
+        clips: (F,) clip of each frame.
     """
     offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
     known = np.isfinite(offset)
@@ -187,7 +226,7 @@ def sums_of_moving_errors(
 
 
 def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
-    """Sums of one figure a frame, (F,); NaN frames do not count."""
+    """Sums of one figure a frame, values (F,), by clips (F,); NaN frames do not count."""
     known = np.isfinite(values)
     return ClipSums(
         {
@@ -198,7 +237,7 @@ def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums
 
 
 def by_clip(values: np.ndarray, clips: np.ndarray, combine: np.ufunc = np.add) -> np.ndarray:
-    """Combine (F, ...) values frame by frame into (clips, ...)."""
+    """Combine values (F, ...) frame by frame into (clips, ...), by clips (F,)."""
     result = np.zeros((int(clips.max()) + 1, *values.shape[1:]))
     combine.at(result, clips, values)
     return result
@@ -207,7 +246,7 @@ def by_clip(values: np.ndarray, clips: np.ndarray, combine: np.ufunc = np.add) -
 def weighted_sums(
     values: np.ndarray, weights: np.ndarray, clips: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of weights and of weighted values of each clip, (clips,) each."""
+    """Sum of weights (V,) and of weighted values (F, V) of each clip, (clips,) each, by clips (F,)."""
     finite = np.isfinite(values)
     weight = (finite * weights).sum(axis=1)
     total = (np.where(finite, values, 0.0) * weights).sum(axis=1)

@@ -11,15 +11,14 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
-from vermilion.evaluation.reference import Reference, truth_of_vertices
+from vermilion.evaluation.reference import MatchTolerance, Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
-from vermilion.faces.lips import lip_labels
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.geometry.camera import Camera
-from vermilion.geometry.closest_points import SurfacePoints
-from vermilion.geometry.frame_alignment import moved
-from vermilion.geometry.mesh import triangle_areas
+from vermilion.geometry.mesh import Mesh, triangle_areas
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.regression.model import LipModel
 
 _EYE_CORNERS = (36, 45)
@@ -49,12 +48,6 @@ class Regressed:
         return cls(model, corrected_mm[rows], seconds)
 
 
-def points_on_h(correspondence: Correspondence) -> SurfacePoints:
-    """The point of H of each vertex of C."""
-    at = correspondence.vertices
-    return SurfacePoints(at.triangle, at.barycentric, correspondence.distance_mm)
-
-
 def points_on_truth(
     correspondence: Correspondence,
     tracker: FaceModel,
@@ -67,15 +60,12 @@ def points_on_truth(
 ) -> SurfacePoints:
     """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`."""
     return truth_of_vertices(
-        points_on_h(correspondence),
-        np.asarray(h_neutral_mm, dtype=np.float64),
-        correspondence.accurate_triangles,
-        lip_labels(template),
-        lip_labels(tracker),
-        np.asarray(truth_neutral_mm, dtype=np.float64),
-        truth_triangles,
-        max_distance_mm,
-        float(np.cos(np.radians(max_normal_angle_deg))),
+        correspondence.vertices,
+        Mesh(np.asarray(h_neutral_mm, dtype=np.float64), correspondence.accurate_triangles),
+        lip_sides(template),
+        lip_sides(tracker),
+        Mesh(np.asarray(truth_neutral_mm, dtype=np.float64), truth_triangles),
+        MatchTolerance(max_distance_mm, float(np.cos(np.radians(max_normal_angle_deg)))),
     )
 
 
@@ -155,21 +145,19 @@ def shown_arrays(
     """
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = shown_rows(base, count)
-    rotations, translations = (part[chosen] for part in result.head)
+    head = result.head[chosen]
     names = [name for name in result.aligned_mm if not is_variant(name)]
     of_truth = {"base": neutral_mm, "contour": neutral_mm}
     used = np.unique(reference.triangles)
     lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]
     local = camera.to_camera(take.coarse_mm[chosen][:, lips].mean(axis=1))
     arrays = {
-        "meshes_mm": np.stack(
-            [moved(result.aligned_mm[n][chosen], rotations, translations) for n in names]
-        ),
+        "meshes_mm": np.stack([head.apply(result.aligned_mm[n][chosen]) for n in names]),
         "errors_mm": np.stack([result.errors_mm[n][chosen] for n in names]),
         "neutrals_mm": np.stack([of_truth.get(n, reference.rest_mm) for n in names]),
-        "points_mm": moved(reference.points_mm[chosen], rotations, translations),
+        "points_mm": head.apply(reference.points_mm[chosen]),
         "rest_mm": reference.rest_mm,
-        "surface_mm": moved(reference.vertices_mm[chosen][:, used], rotations, translations),
+        "surface_mm": head.apply(reference.vertices_mm[chosen][:, used]),
     }
     return {name: values.astype(np.float32) for name, values in arrays.items()} | {
         "frames": frames[chosen],

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.faces.lips import lip_labels, lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 
 N_COLUMNS = 7
@@ -33,13 +33,13 @@ def columns_of(model: FaceModel) -> np.ndarray:
 
     The columns stand side by side from the subject's right to their left, in the neutral.
     """
-    sides = lips_with_inside(model)
+    sides = lip_sides(model, with_inside=True)
     x = model.neutral_mm[:, 0]
-    vermilion = lip_labels(model) > 0
+    vermilion = lip_sides(model) != 0
     low, high = x[vermilion].min(), x[vermilion].max()
     start, width = low + 0.25 * (high - low), 0.5 * (high - low) / N_COLUMNS
     column = np.floor((x - start) / width).astype(np.int64)
-    return np.where((sides > 0) & (column >= 0) & (column < N_COLUMNS), column, -1)
+    return np.where((sides != 0) & (column >= 0) & (column < N_COLUMNS), column, -1)
 
 
 def lip_gaps(points_mm: np.ndarray, sides: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -49,13 +49,13 @@ def lip_gaps(points_mm: np.ndarray, sides: np.ndarray, columns: np.ndarray) -> n
 
     Args:
         points_mm: (F, V, 3) in the head frame (y up); NaN points do not count.
-        sides, columns: (V,) of `lips_with_inside`, `columns_of`.
+        sides, columns: (V,) of `lip_sides` with the inside, `columns_of`.
     """
     gaps = np.full((len(points_mm), N_COLUMNS), np.nan)
     height = points_mm[..., 1]
     for column in range(N_COLUMNS):
         upper = height[:, (columns == column) & (sides == 1)]
-        lower = height[:, (columns == column) & (sides == 2)]
+        lower = height[:, (columns == column) & (sides == -1)]
         if upper.shape[1] == 0 or lower.shape[1] == 0:
             continue
         lowest = np.where(np.isfinite(upper), upper, np.inf).min(axis=1)
@@ -74,7 +74,7 @@ def aperture_mm(gaps: np.ndarray) -> np.ndarray:
 
 
 def lip_depths(sequence_mm: np.ndarray, model: FaceModel) -> np.ndarray:
-    """How deep one lip lies in the other, (F,) mm, of meshes (F, V, 3); 0 where neither does.
+    """How deep one lip lies in the other, (F,) mm, of sequence_mm (F, V, 3); 0 where neither does.
 
     Away from the corners of the mouth, where the lips are one surface.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.faces.lips import lip_labels
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import vertex_areas
@@ -22,12 +22,10 @@ class Regions:
     Attributes:
         weights: region name -> (V,) area in mm2, zero outside the region.
         rest: (V,) area in mm2 of the face outside the mouth mask, for the alignment.
-        lips: (V,) int8: 1 upper vermilion, 2 lower, 0 elsewhere.
     """
 
     weights: dict[str, np.ndarray]
     rest: np.ndarray
-    lips: np.ndarray
 
     @property
     def used(self) -> np.ndarray:
@@ -35,9 +33,9 @@ class Regions:
         return (np.stack(list(self.weights.values())) > 0).any(axis=0) | (self.rest > 0)
 
     def restricted(self, valid: np.ndarray) -> Regions:
-        """The regions without the vertices that have no counterpart in the truth."""
+        """The regions of the valid (V,) bool vertices, those with a counterpart in the truth."""
         weights = {name: np.where(valid, w, 0.0) for name, w in self.weights.items()}
-        return Regions(weights, np.where(valid, self.rest, 0.0), self.lips)
+        return Regions(weights, np.where(valid, self.rest, 0.0))
 
 
 def regions_of_mask(
@@ -46,7 +44,7 @@ def regions_of_mask(
     """Regions of a topology whose mouth mask is given.
 
     Args:
-        model: names the face, the vermilion and the inside of the mouth.
+        model: V vertices; names the face, the vermilion and the inside of the mouth.
         neutral_mm: (V, 3) of the person, for the areas.
         mouth_triangles: triangles of the correction layer, ids or (T,) bool. The inside of the mouth
             does not count, even where the layer covers it: no camera sees it.
@@ -55,8 +53,8 @@ def regions_of_mask(
     mask = np.zeros(len(triangles), dtype=bool)
     mask[mouth_triangles] = True
     seen = ~(model.regions["mouth_inner"] | model.regions["eyes"] | model.regions["teeth"])
-    lips = lip_labels(model)
-    face = (model.regions["face"] | (lips > 0)) & (seen | (lips > 0))
+    lips = lip_sides(model) != 0
+    face = (model.regions["face"] | lips) & (seen | lips)
 
     def area(of_triangles: np.ndarray, of_vertices: np.ndarray) -> np.ndarray:
         chosen = triangles[of_triangles]
@@ -66,11 +64,11 @@ def regions_of_mask(
     touched = np.zeros(model.n_vertices, dtype=bool)
     touched[triangles[mask].ravel()] = True
     weights = {
-        "vermilion": area(everywhere, lips > 0),
+        "vermilion": area(everywhere, lips),
         "mouth": area(mask, face),
         "face": area(everywhere, face),
     }
-    return Regions(weights, area(everywhere, face & ~touched), lips)
+    return Regions(weights, area(everywhere, face & ~touched))
 
 
 def mask_on(

@@ -8,7 +8,7 @@ import numpy as np
 
 from vermilion.evaluation.lips import aperture_mm, columns_of, lip_gaps
 from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 
 KINDS = ("kiss", "roll", "press", "open", "smile", "speech")
@@ -100,7 +100,7 @@ def _lip_measures(points_mm: np.ndarray, model: FaceModel, valid: np.ndarray):
         near = valid & (np.linalg.norm(model.neutral_mm - at, axis=1) < _CORNER_MM)
         corners.append(points_mm[:, near].mean(axis=1) if near.any() else np.full(3, np.nan))
     columns = np.where(valid, columns_of(model), -1)
-    gap = aperture_mm(lip_gaps(points_mm, lips_with_inside(model), columns))
+    gap = aperture_mm(lip_gaps(points_mm, lip_sides(model, with_inside=True), columns))
     middle = vermilion & (columns >= 0)
     height = points_mm[:, middle, 1]
     red = np.quantile(height, 0.98, axis=1) - np.quantile(height, 0.02, axis=1) - gap

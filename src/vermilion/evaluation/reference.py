@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.geometry.closest_points import Surface, SurfacePoints
-from vermilion.geometry.mesh import triangle_normals, vertex_normals
+from vermilion.faces.lips import triangle_sides
+from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.mesh import Mesh, triangle_normals, vertex_normals
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.storage.errors import InputError
 
 _CROP_MARGIN_MM = 25.0
@@ -50,125 +52,135 @@ def reference_of(
     neutral_mm: np.ndarray | None = None,
     **place,
 ) -> Reference:
-    """Follow `where` (V points on the surface) through the surface's frames (F, S, 3).
+    """Follow points on a surface through its frames.
 
     The surface is cropped to the surroundings of the points in the first frame: the back of a head
     is no neighbour of a face.
 
     Args:
+        kind: `truth` or `H`.
+        where: V points on the surface.
+        vertices_mm: (F, S, 3) the surface, any world, mm.
+        triangles: (U, 3) of it.
         neutral_mm: (S, 3) the surface at the neutral; None: the first frame is it.
         place: subject and take, for messages.
+
+    Returns:
+        the reference, in the surface's world.
 
     Raises:
         InputError: no vertex has a point on the surface.
     """
-    if not where.found.any():
+    if not where.bound.any():
         raise InputError(
             "no vertex with a point on the surface that it is measured against",
             "truth in the world of the rig, in millimetres, whose first frame is the neutral",
             "Look at evaluation.truth, and at evaluation.reference for what counts as near.",
             **place,
         )
-    points = where.on(np.asarray(vertices_mm, dtype=np.float64), triangles)
+    points = where.sample(vertices_mm, triangles)
     first = points[0][np.isfinite(points[0]).all(axis=1)]
     low, high = first.min(axis=0) - _CROP_MARGIN_MM, first.max(axis=0) + _CROP_MARGIN_MM
     near = ((vertices_mm[0] >= low) & (vertices_mm[0] <= high)).all(axis=1)
     if neutral_mm is not None:
-        neutral_mm = where.on(np.asarray(neutral_mm, dtype=np.float64), triangles)
+        neutral_mm = where.sample(neutral_mm, triangles)
     kept = triangles[near[triangles].all(axis=1)]
     return Reference(kind, points, vertices_mm, kept, neutral_mm)
+
+
+@dataclass(frozen=True)
+class MatchTolerance:
+    """What counts as the same place on two surfaces.
+
+    Attributes:
+        max_distance_mm: points farther away have no counterpart.
+        min_cosine: between the normals of a point and of its triangle, at least.
+    """
+
+    max_distance_mm: float
+    min_cosine: float
 
 
 def attach(
     points_mm: np.ndarray,
     normals: np.ndarray,
-    lips: np.ndarray,
+    sides: np.ndarray,
     surface: Surface,
-    triangle_lips: np.ndarray,
-    max_distance_mm: float,
-    min_cosine: float,
+    surface_sides: np.ndarray,
+    near: MatchTolerance,
 ) -> SurfacePoints:
     """The point of a surface that each given point lies on, in the neutral, once a subject.
 
-    Nearest point among the triangles that face the same way and do not belong to the other lip.
-    Points farther away than `max_distance_mm` have none.
+    Closest point among the triangles that face the same way and do not belong to the other lip.
 
     Args:
-        points_mm, normals: (N, 3) in the surface's world.
-        lips: (N,) 1 upper, 2 lower, 0 neither.
-        triangle_lips: (T,) the same of the surface's triangles.
+        points_mm, normals: (N, 3) in the surface's world, mm; unit.
+        sides: (N,) lips, +1 upper, -1 lower, 0 neither.
+        surface: T triangles.
+        surface_sides: (T,) lips of its triangles.
+        near: points that are not near are unbound.
+
+    Returns:
+        N points of the surface.
     """
-    found = surface.closest(points_mm, normals, min_cosine, lips, triangle_lips)
-    far = found.distance_mm > max_distance_mm
-    return SurfacePoints(
-        np.where(far, -1, found.triangle),
-        found.barycentric,
-        np.where(far, np.inf, found.distance_mm),
-    )
+    found = surface.closest(points_mm, normals, near.min_cosine, sides, surface_sides)
+    return found.restricted(found.distance_mm <= near.max_distance_mm)
 
 
-def transfer_lips(
-    vertices_mm: np.ndarray,
-    triangles: np.ndarray,
-    lips: np.ndarray,
-    to_vertices_mm: np.ndarray,
-    to_triangles: np.ndarray,
-    max_distance_mm: float,
-    min_cosine: float,
-) -> np.ndarray:
-    """Lip labels (T',) of the triangles of another mesh of the same face in the same pose.
+def transfer_lips(mesh: Mesh, sides: np.ndarray, other: Mesh, near: MatchTolerance) -> np.ndarray:
+    """Lips of the triangles of another mesh of the same face in the same pose.
 
     Args:
-        vertices_mm, triangles, lips: the labelled mesh, labels (V,).
-        to_vertices_mm, to_triangles: the mesh without labels.
+        mesh: V vertices, whose lips are known, mm.
+        sides: (V,) +1 upper, -1 lower, 0 neither.
+        other: T' triangles, in the same world, mm.
+        near: triangles that are not near have no side.
+
+    Returns:
+        (T',) int8 likewise.
     """
     # By the triangles' middles: where lips touch, vertices lie on both.
-    middles = to_vertices_mm[to_triangles].mean(axis=1)
-    normals = triangle_normals(to_vertices_mm, to_triangles)
-    found = Surface(vertices_mm, triangles).closest(middles, normals, min_cosine)
-    near = found.found & (found.distance_mm <= max_distance_mm)
-    corners = lips[triangles]
-    both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
-    of_triangle = np.where(both, 0, corners.max(axis=1))
-    return np.where(near, of_triangle[np.maximum(found.triangle, 0)], 0)
+    middles = other.vertices_mm[other.triangles].mean(axis=1)
+    normals = triangle_normals(other.vertices_mm, other.triangles)
+    found = Surface(mesh.vertices_mm, mesh.triangles).closest(middles, normals, near.min_cosine)
+    close = found.bound & (found.distance_mm <= near.max_distance_mm)
+    of_triangle = triangle_sides(mesh.triangles, sides)
+    return np.where(close, of_triangle[np.maximum(found.triangle, 0)], 0)
 
 
 def truth_of_vertices(
     where_on_h: SurfacePoints,
-    h_neutral_mm: np.ndarray,
-    h_triangles: np.ndarray,
-    h_lips: np.ndarray,
-    lips: np.ndarray,
-    truth_neutral_mm: np.ndarray,
-    truth_triangles: np.ndarray,
-    max_distance_mm: float,
-    min_cosine: float,
+    h_neutral: Mesh,
+    h_sides: np.ndarray,
+    sides: np.ndarray,
+    truth_neutral: Mesh,
+    near: MatchTolerance,
 ) -> SurfacePoints:
-    """The truth's point of each vertex of C: C vertex -> H -> nearest point of the truth's neutral.
+    """The truth's point of each vertex of C: C vertex -> H -> closest point of the truth's neutral.
 
     Both neutrals are the same frame of the same take in the same world. No triangle of one lip is
     taken for a vertex of the other.
 
     Args:
-        where_on_h: (V,) points of C's vertices on H.
-        h_lips: (Vh,) lip labels of H's vertices; lips: (V,) of C's.
+        where_on_h: V points, C's vertices on H.
+        h_neutral: Vh vertices of H, mm.
+        h_sides: (Vh,) lips of H's vertices, +1 upper, -1 lower, 0 neither.
+        sides: (V,) lips of C's vertices.
+        truth_neutral: the truth's mesh, mm.
+        near: what counts as the same place.
+
+    Returns:
+        V points of the truth; unbound where H or the truth has none.
     """
-    labels = transfer_lips(
-        h_neutral_mm, h_triangles, h_lips, truth_neutral_mm, truth_triangles,
-        max_distance_mm, min_cosine,
-    )  # fmt: skip
-    points = where_on_h.on(h_neutral_mm, h_triangles)
-    normals = where_on_h.on(vertex_normals(h_neutral_mm, h_triangles), h_triangles)
-    known = where_on_h.found
-    found = attach(
-        np.nan_to_num(points), np.nan_to_num(normals), lips,
-        Surface(truth_neutral_mm, truth_triangles), labels, max_distance_mm, min_cosine,
-    )  # fmt: skip
-    return SurfacePoints(
-        np.where(known, found.triangle, -1),
-        found.barycentric,
-        np.where(known, found.distance_mm, np.inf),
+    truth_sides = transfer_lips(h_neutral, h_sides, truth_neutral, near)
+    on_h = vertex_normals(h_neutral.vertices_mm, h_neutral.triangles)
+    points, normals = (
+        np.nan_to_num(where_on_h.sample(values, h_neutral.triangles))
+        for values in (h_neutral.vertices_mm, on_h)
     )
+    surface = Surface(truth_neutral.vertices_mm, truth_neutral.triangles)
+    found = attach(points, normals, sides, surface, truth_sides, near)
+    return found.restricted(where_on_h.bound)
 
 
 def drift(
@@ -195,6 +207,6 @@ def drift(
         surface = Surface(surface_mm, reference.triangles)
         normals = vertex_normals(points.astype(np.float64), triangles)[ids]
         found = surface.closest(points[ids], normals, min_cosine)
-        nearest = found.on(np.asarray(surface_mm, dtype=np.float64), reference.triangles)
+        nearest = found.sample(surface_mm, reference.triangles)
         result[frame, ids] = np.linalg.norm(nearest - reference.points_mm[frame, ids], axis=1)
     return result

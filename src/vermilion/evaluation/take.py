@@ -32,9 +32,9 @@ from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.frame_alignment import align_frames, moved
+from vermilion.geometry.alignment import FrameAlignment, align_frames
 from vermilion.storage.progress import progress
 
 
@@ -48,7 +48,7 @@ class TakeResult:
             regressor `truth` has its aperture alone.
         aligned_mm: regressor -> (F, V, 3) in the reference's world.
         errors_mm: regressor -> (F, V) vertex error; NaN where a vertex has no counterpart.
-        head: (F, 3, 3) and (F, 3), from the reference's world to the head frame.
+        head: of each frame, from the reference's world to the head frame.
         kinds: (F,) kind of mouth shape.
         clips: (F,) clip of each frame.
     """
@@ -57,7 +57,7 @@ class TakeResult:
     table: pd.DataFrame
     aligned_mm: dict[str, np.ndarray]
     errors_mm: dict[str, np.ndarray]
-    head: tuple[np.ndarray, np.ndarray]
+    head: FrameAlignment
     kinds: np.ndarray
     clips: np.ndarray
 
@@ -89,21 +89,20 @@ def evaluate_take(
     """
     regions = regions.restricted(reference.valid)
     aligned = {
-        name: moved(s, *align_frames(s, reference.points_mm, regions.rest))
+        name: align_frames(s, reference.points_mm, regions.rest).apply(s)
         for name, s in sequences_mm.items()
     }
-    neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
-    head_rotations, head_translations = align_frames(reference.points_mm, neutral, regions.rest)
+    head = align_frames(reference.points_mm, model.neutral_mm, regions.rest)
     if curves is not None:
         kinds = kinds_of_curves(curves)
     else:
         rest = reference.rest_mm[None]
-        rest = moved(rest, *align_frames(rest, neutral[:1], regions.rest))[0]
-        posed = moved(reference.points_mm, head_rotations, head_translations)
+        rest = align_frames(rest, model.neutral_mm, regions.rest).apply(rest)[0]
+        posed = head.apply(reference.points_mm)
         kinds = kinds_of_shapes(posed, rest, model, reference.valid)
     clips = clips_of(frames, clip_frames, min_clips)
-    sides, columns = lips_with_inside(model), columns_of(model)
-    true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
+    sides, columns = lip_sides(model, with_inside=True), columns_of(model)
+    true_gaps = gaps_in_head(reference.points_mm, head.rotations, sides, columns)
     surface = surface_errors(
         aligned, reference, regions.used, lambda items: progress(items, "surface errors")
     )
@@ -111,11 +110,11 @@ def evaluate_take(
     columns = np.where(reference.valid, columns, -1)
     sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
-        gaps = gaps_in_head(sequence, head_rotations, sides, columns)
+        gaps = gaps_in_head(sequence, head.rotations, sides, columns)
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
-            + sums_of_moving_errors(sequence, reference, head_rotations, regions, clips)
+            + sums_of_moving_errors(sequence, reference, head.rotations, regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)
@@ -125,7 +124,6 @@ def evaluate_take(
         )
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
-    head = head_rotations, head_translations
     return TakeResult(sums, table, aligned, errors, head, kinds, clips)
 
 
@@ -154,7 +152,7 @@ def evaluate_reconstruction(
         {"H": sequence_mm}, reference, regions.used, lambda items: progress(items, "H")
     )["H"]
     errors = vertex_errors(sequence_mm, reference)
-    shown = Regions({"visible": regions.weights["vermilion"]}, regions.rest, regions.lips)
+    shown = Regions({"visible": regions.weights["vermilion"]}, regions.rest)
     hidden = np.where(seen, 0.0, np.nan)
     sums = sums_of_errors(errors, surface, regions, clips)
     sums += sums_of_jitter(sequence_mm, reference, frames, regions, clips)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.faces.binding import bind_to_surface
 from vermilion.faces.contours import closed_loop, edge_graph, without_spurs
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.closest_points import Surface
 from vermilion.storage.errors import InputError
 
 #: Weight of jawOpen at which the lips are so far apart that neither binds to the other.
@@ -37,8 +37,8 @@ def decimate_model(
     opening = model.expressions_mm[model.expression_names.index(open_shape)]
     pose = model.neutral_mm + APART * opening
     vertices, triangles = _decimated(pose, model.triangles, _density(model), n_triangles)
-    triangle, weights = bind_to_surface(pose, model.triangles, vertices)
-    corners = model.triangles[triangle].astype(np.int64)
+    bound = Surface(pose, model.triangles).closest(vertices)
+    corners, weights = bound.corners(model.triangles).astype(np.int64), bound.barycentric
     landmarks = _snap(vertices, pose, model.landmarks, corners, weights)
     outer = _contour(vertices, triangles, pose, model, "outer", landmarks, corners, weights)
     inner = _contour(vertices, triangles, pose, model, "inner", landmarks, corners, weights)

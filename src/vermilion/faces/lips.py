@@ -1,29 +1,75 @@
-"""Which vertices of a face model are which lip."""
+"""Which vertices and triangles are which lip: +1 the upper lip, -1 the lower, 0 neither."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.mesh import Mesh, adjacency, unique_edges
 
-_GROW_RINGS = 2
-
-
-def lip_labels(model: FaceModel) -> np.ndarray:
-    """(V,) int8: 1 upper vermilion, 2 lower, 0 elsewhere."""
-    labels = np.zeros(model.n_vertices, dtype=np.int8)
-    labels[model.regions["vermilion_upper"]] = 1
-    labels[model.regions["vermilion_lower"]] = 2
-    return labels
+_INSIDE_RINGS = 2
 
 
-def lips_with_inside(model: FaceModel) -> np.ndarray:
-    """(V,) int8: 1 upper lip, 2 lower, 0 neither; the vermilion and a little of the lips' inside."""
-    labels = lip_labels(model)
+def lip_sides(model: FaceModel, with_inside: bool = False) -> np.ndarray:
+    """Side of each vertex by the regions of a face model.
+
+    Args:
+        model: V vertices.
+        with_inside: the inside of the lips counts as well, two rings of vertices from the vermilion.
+
+    Returns:
+        (V,) int8: +1 upper vermilion, -1 lower, 0 elsewhere.
+    """
+    upper, lower = model.regions["vermilion_upper"], model.regions["vermilion_lower"]
+    sides = np.where(lower, -1, upper).astype(np.int8)
     neighbours = adjacency(model.triangles, model.n_vertices)
-    for _ in range(_GROW_RINGS):
-        upper, lower = (neighbours @ (labels == side) > 0 for side in (1, 2))
-        free = (labels == 0) & model.regions["mouth_inner"] & ~(upper & lower)
-        labels = np.where(free & upper, 1, np.where(free & lower, 2, labels)).astype(np.int8)
-    return labels
+    for _ in range(_INSIDE_RINGS if with_inside else 0):
+        upper, lower = (neighbours @ (sides == side) > 0 for side in (1, -1))
+        free = (sides == 0) & model.regions["mouth_inner"]
+        sides = np.where(free, upper.astype(np.int8) - lower, sides)
+    return sides
+
+
+def lip_sides_by_distance(
+    mesh: Mesh, regions: Mapping[str, np.ndarray], corner_mm: float = 0.0
+) -> np.ndarray:
+    """Side of each vertex of the lips and the whole inside of the mouth.
+
+    A vertex belongs to the lip whose vermilion is nearer along the mouth's surface. Where both are
+    as near, the inside is of the lower lip, the vermilion of neither.
+
+    Args:
+        mesh: the neutral, any frame, mm.
+        regions: names of `FaceModel.regions` -> (V,) bool.
+        corner_mm: vertices whose two distances differ by no more lie at the corners of the mouth,
+            where the lips are one surface; they have no side.
+
+    Returns:
+        (V,) int8: +1 upper lip, -1 lower, 0 elsewhere.
+    """
+    upper, lower = regions["vermilion_upper"], regions["vermilion_lower"]
+    if not (upper.any() and lower.any()):
+        return upper.astype(np.int8) - lower.astype(np.int8)
+    inside = regions["mouth_inner"]
+    mouth = upper | lower | inside
+    edges = unique_edges(mesh.triangles)
+    edges = edges[mouth[edges].all(axis=1)]
+    lengths = np.linalg.norm(mesh.vertices_mm[edges[:, 0]] - mesh.vertices_mm[edges[:, 1]], axis=1)
+    graph = sparse.csr_matrix((lengths, (edges[:, 0], edges[:, 1])), shape=(len(mouth),) * 2)
+    to_upper, to_lower = (
+        csgraph.dijkstra(graph, directed=False, indices=np.flatnonzero(lip), min_only=True)
+        for lip in (upper, lower)
+    )
+    is_upper = to_upper + corner_mm < to_lower
+    is_lower = to_lower + corner_mm < to_upper
+    is_lower |= inside & (to_lower + corner_mm == to_upper) & np.isfinite(to_lower)
+    return np.where(mouth, is_upper.astype(np.int8) - is_lower, 0).astype(np.int8)
+
+
+def triangle_sides(triangles: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Side of triangles (T, 3) by the sides (V,) of their corners, the more frequent one, (T,) int8."""
+    return np.sign(sides[triangles].sum(axis=1)).astype(np.int8)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import unique_edges
-from vermilion.geometry.mesh_points import MeshPoints
+from vermilion.geometry.surface_points import SurfacePoints
 
 #: Parts that every edge is cut into.
 _PER_EDGE = 4
@@ -29,11 +29,17 @@ class OccludingContour:
 
     Attributes:
         points: N on the lips and a little of their inside.
-        sides: (N,) 1 upper lip, 2 lower.
+        sides: (N,) +1 upper lip, -1 lower.
+        triangles: (T, 3) of the topology.
     """
 
-    points: MeshPoints
+    points: SurfacePoints
     sides: np.ndarray
+    triangles: np.ndarray
+
+    def on(self, vertices_mm: np.ndarray) -> np.ndarray:
+        """The points (N, 3) on a mesh (V, 3) of the topology, in its frame, mm."""
+        return self.points.sample(vertices_mm, self.triangles)
 
     @classmethod
     def of(cls, model: FaceModel) -> OccludingContour:
@@ -41,18 +47,20 @@ class OccludingContour:
 
         Extremes of a triangle lie on its edges.
         """
-        sides = lips_with_inside(model)
+        sides = lip_sides(model, with_inside=True)
         of_corner = sides[model.triangles]
-        whole = (of_corner == of_corner[:, :1]).all(axis=1) & (of_corner[:, 0] > 0)
+        whole = (of_corner == of_corner[:, :1]).all(axis=1) & (of_corner[:, 0] != 0)
         start, end = unique_edges(model.triangles[whole]).T
         vertices = np.unique([start, end])
         share = np.arange(1, _PER_EDGE) / _PER_EDGE
-        points = MeshPoints.on_edges(
+        points = SurfacePoints.on_edges(
             np.concatenate([vertices, np.repeat(start, len(share))]),
             np.concatenate([vertices, np.repeat(end, len(share))]),
             np.concatenate([np.zeros(len(vertices)), np.tile(share, len(start))]),
+            model.triangles,
         )
-        return cls(points, sides[points.vertices[:, 0]])
+        of_points = np.concatenate([sides[vertices], np.repeat(sides[start], len(share))])
+        return cls(points, of_points, model.triangles)
 
     def match(
         self, pixels: np.ndarray, outer_px: np.ndarray, inner_px: np.ndarray, known: np.ndarray
@@ -80,9 +88,9 @@ class OccludingContour:
         height = pixels @ up
         samples, points = [], []
         upper, lower = np.arange(1, half), np.arange(half + 1, 2 * half)
-        for side, of_side, sign in ((1, upper, 1.0), (2, lower, -1.0)):
+        for side, of_side in ((1, upper), (-1, lower)):
             ids = np.flatnonzero(self.sides == side)
-            order = ids[np.argsort(_APART * column[ids] + sign * height[ids], kind="stable")]
+            order = ids[np.argsort(_APART * column[ids] + side * height[ids], kind="stable")]
             columns, first = np.unique(column[order], return_index=True)
             if not len(columns):
                 continue

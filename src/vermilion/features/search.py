@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from vermilion.contours.curves import smoothed_ring
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.features.arch import arch_depth
+from vermilion.imaging.sampling import sample_bilinear
 
 #: What the fourth power counts beside the square in the cost of an inner contour far from the model's.
 _STEEP = 8.0
@@ -110,7 +110,7 @@ def find_outer(
     places = np.arange(-settings.outward, settings.inward + 1e-9, settings.step)
     lines, depth = ring[:, None] + places[:, None] * unit * normals[:, None], arch_depth(ring)
     lines[..., 2:] += depth(lines) - depth(ring)[:, None]
-    profile = sample(likelihood, to_pixels(lines))
+    profile = sample_bilinear(np.float32(likelihood), to_pixels(lines), "zero").astype(np.float64)
     cost = -np.log(profile + settings.floor)
     cost += settings.model_weight * (places / settings.inward) ** 2
     chosen = cheapest_ring(cost, step_cost(ring / unit, settings.step, settings.smooth_weight))
@@ -152,7 +152,7 @@ def find_inner(
     lines[..., 2:] = (
         depth(lines) + from_outer[:, None] * (1 - passed) + from_inner[:, None] * passed
     )
-    profile = sample(likelihood, to_pixels(lines))
+    profile = sample_bilinear(np.float32(likelihood), to_pixels(lines), "zero").astype(np.float64)
     ridge = round(0.012 / settings.step)  # half the width of a ridge does not count as before
     before = np.cumsum(-np.log1p(-np.minimum(profile, 0.98)), axis=1) * (settings.step / 0.02)
     before = np.pad(before, ((0, 0), (ridge, 0)))[:, : len(places)]
@@ -160,21 +160,6 @@ def find_inner(
     cost += settings.model_weight * _distance_cost((places - expected[:, None]) / settings.inward)
     chosen = cheapest_ring(cost, step_cost(outer / unit, settings.step, settings.smooth_weight))
     return _refined(profile, places, chosen, lines, settings)
-
-
-def sample(values: np.ndarray, points_px: np.ndarray) -> np.ndarray:
-    """Bilinear values (h, w) at pixels (n, m, 2), zero outside, (n, m) float64."""
-    x = (points_px[..., 0] - 0.5).astype(np.float32)
-    y = (points_px[..., 1] - 0.5).astype(np.float32)
-    found = cv2.remap(
-        np.ascontiguousarray(values, dtype=np.float32),
-        x,
-        y,
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=0.0,
-    )
-    return found.astype(np.float64)
 
 
 def _distance_cost(reaches: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ class TrackedLips:
         outer, inner = (
             camera.project(ring.points(vertices_mm)) for ring in (self.outer, self.inner)
         )
-        lips = camera.project(self.occluding.points.of(vertices_mm))
+        lips = camera.project(self.occluding.on(vertices_mm))
         known = np.ones(len(inner), dtype=bool)
         samples, points, _ = self.occluding.match(lips, outer, inner, known)
         inner[samples] = lips[points]

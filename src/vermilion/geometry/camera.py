@@ -37,10 +37,12 @@ class Camera:
 
     @property
     def rotation(self) -> np.ndarray:
+        """(3, 3) of `cam_from_world`."""
         return self.cam_from_world[:, :3]
 
     @property
     def translation(self) -> np.ndarray:
+        """(3,) mm of `cam_from_world`."""
         return self.cam_from_world[:, 3]
 
     @property
@@ -63,11 +65,11 @@ class Camera:
         return np.asarray(self.colmap().calibration_matrix())
 
     def to_camera(self, points_mm: np.ndarray) -> np.ndarray:
-        """World points (..., 3) in the camera frame, (..., 3) mm."""
+        """The points_mm (..., 3) of the world in the camera frame, (..., 3) mm."""
         return points_mm @ self.rotation.T + self.translation
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
-        """World points (..., 3) mm to pixels (..., 2). Points behind the camera become NaN."""
+        """Pixels (..., 2) of points_mm (..., 3) in the world; NaN for points behind the camera."""
         local = self.to_camera(np.asarray(points_mm, dtype=np.float64))
         depth = local[..., 2:3]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -80,7 +82,7 @@ class Camera:
         return np.where(depth > 1e-9, pixels, np.nan)
 
     def pixel_jacobian(self, points_mm: np.ndarray, step_mm: float = 0.05) -> np.ndarray:
-        """Change of the pixel by the world point, (..., 2, 3) px/mm, at points (..., 3).
+        """Change of the pixel by the world point, (..., 2, 3) px/mm, at points_mm (..., 3), world.
 
         Exact for a pinhole; by central differences of `step_mm` for other lenses.
         """
@@ -145,7 +147,17 @@ def pinhole(
     height_px: int,
     cam_from_world: np.ndarray | None = None,
 ) -> Camera:
-    """A pinhole camera with its principal point in the middle; at the world's origin by default."""
+    """A pinhole camera with its principal point in the middle.
+
+    Args:
+        name: of the camera.
+        focal_px: of both axes.
+        width_px, height_px: size of its image.
+        cam_from_world: (3, 4), mm; None: the camera is the world's frame.
+
+    Returns:
+        the camera.
+    """
     if cam_from_world is None:
         cam_from_world = np.eye(3, 4)
     params = (float(focal_px), float(focal_px), width_px / 2, height_px / 2)
@@ -153,7 +165,16 @@ def pinhole(
 
 
 def look_at(centre_mm: np.ndarray, target_mm: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """`cam_from_world` (3, 4) of a camera at `centre_mm` that looks at `target_mm`; `up` is up."""
+    """Pose of a camera that looks at a point.
+
+    Args:
+        centre_mm: (3,) its centre, world, mm.
+        target_mm: (3,) what it looks at, world, mm.
+        up: (3,) what is up in its image, world.
+
+    Returns:
+        (3, 4) `cam_from_world`, mm.
+    """
     forward = np.asarray(target_mm, float) - centre_mm
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, up)
@@ -217,7 +238,7 @@ def write_cameras(folder: str | Path, cameras: dict[str, Camera]) -> None:
 
 
 def portrait_camera(vertices_mm: np.ndarray, size_px: int = 420) -> Camera:
-    """A camera in front of a face in its head frame (V, 3), which fills the image."""
+    """A camera in front of a face, vertices_mm (V, 3) in its head frame, which fills the image."""
     low, high = vertices_mm.min(axis=0), vertices_mm.max(axis=0)
     middle, distance = (low + high) / 2, 900.0
     extent = float(max(high[0] - low[0], high[1] - low[1])) * 1.05

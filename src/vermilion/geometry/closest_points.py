@@ -1,54 +1,30 @@
-"""Nearest points of a triangle mesh, with conditions on the triangles that may be chosen."""
+"""Closest points of a triangle mesh, with conditions on the triangles that may be chosen."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.geometry.mesh import triangle_areas, triangle_normals
+from vermilion.geometry.surface_points import SurfacePoints
 
 _FIRST_CANDIDATES = 2
 _CONDITIONAL_CANDIDATES = 48
 _SIZE_QUANTILES = (0.25, 0.5, 0.75, 0.9, 0.98)
 
 
-@dataclass(frozen=True)
-class SurfacePoints:
-    """Points on a mesh.
-
-    Attributes:
-        triangle: (N,) int64, -1 where no triangle fulfils the conditions.
-        barycentric: (N, 3) float64.
-        distance_mm: (N,) float64 to the query, infinite where there is none.
-    """
-
-    triangle: np.ndarray
-    barycentric: np.ndarray
-    distance_mm: np.ndarray
-
-    @property
-    def found(self) -> np.ndarray:
-        return self.triangle >= 0
-
-    def on(self, vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-        """The points on other vertices (..., V, 3) of the same topology, (..., N, 3); NaN if none."""
-        corners = vertices_mm[..., triangles[np.maximum(self.triangle, 0)], :]
-        points = np.einsum("nk,...nkd->...nd", self.barycentric, corners)
-        points[..., ~self.found, :] = np.nan
-        return points
-
-
 class Surface:
-    """A mesh prepared for nearest-point queries; exact, by candidates of a k-d tree.
+    """A mesh prepared for closest-point queries; exact, by candidates of a k-d tree.
 
     Triangles without area are left out.
     """
 
     def __init__(self, vertices_mm: np.ndarray, triangles: np.ndarray):
+        """Prepare a mesh: vertices_mm (V, 3) in any frame, triangles (T, 3)."""
         vertices = np.asarray(vertices_mm, dtype=np.float64)
         kept = np.flatnonzero(triangle_areas(vertices, triangles) > 1e-9)
         self.ids = kept
@@ -70,27 +46,35 @@ class Surface:
         points_mm: np.ndarray,
         normals: np.ndarray | None = None,
         min_cosine: float = 0.5,
-        labels: np.ndarray | None = None,
-        triangle_labels: np.ndarray | None = None,
+        sides: np.ndarray | None = None,
+        triangle_sides: np.ndarray | None = None,
     ) -> SurfacePoints:
-        """Nearest point of the mesh to each of `points_mm` (N, 3).
+        """Closest point of the mesh to each query point, among the triangles that may be chosen.
 
-        With `normals` (N, 3), only triangles whose normal makes a cosine of at least `min_cosine`
-        count. With `labels` (N,) and `triangle_labels` (T,) of all triangles, only triangles with an
-        equal label count; label 0 goes with every label. Conditions are met among the 48 nearest
-        triangles of each size or not at all.
+        Without conditions the result is exact. Conditions are met among the 48 nearest triangles of
+        each of up to six sizes, or not at all: such a point is unbound.
+
+        Args:
+            points_mm: (N, 3) queries in the mesh's frame, finite.
+            normals: (N, 3) unit normals of the queries; only triangles count whose own makes a
+                cosine of at least `min_cosine` with it.
+            min_cosine: see `normals`.
+            sides: (N,) lip of each query: +1 upper, -1 lower, 0 neither (see `faces.lips`).
+            triangle_sides: (T,) the same of the mesh's triangles. A query of one lip is never bound
+                to the other; 0 goes with either.
+
+        Returns:
+            N points with their distance_mm.
         """
         points = np.ascontiguousarray(points_mm, dtype=np.float64)
-        conditional = normals is not None or labels is not None
         given = np.zeros((len(points), 3)) if normals is None else np.asarray(normals, float)
         cosine = -2.0 if normals is None else min_cosine
-        wanted = np.zeros(len(points), np.int64) if labels is None else np.asarray(labels, np.int64)
+        wanted = np.zeros(len(points), np.int64) if sides is None else np.asarray(sides, np.int64)
         owned = np.zeros(len(self.ids), np.int64)
-        if triangle_labels is not None:
-            owned = np.asarray(triangle_labels, np.int64)[self.ids]
+        if triangle_sides is not None:
+            owned = np.asarray(triangle_sides, np.int64)[self.ids]
         best = np.full(len(points), np.inf)
-        triangle = np.full(len(points), -1, np.int64)
-        barycentric = np.zeros((len(points), 3))
+        triangle, barycentric = np.full(len(points), -1, np.int64), np.zeros((len(points), 3))
 
         def search(group: tuple, rows: np.ndarray, k: int) -> np.ndarray:
             """Try the k candidates of each row; returns the distance to the farthest centroid."""
@@ -103,29 +87,36 @@ class Surface:
             )  # fmt: skip
             return far.reshape(len(rows), k)[:, -1]
 
-        # First a good bound from few candidates of every size, then what could be nearer still.
-        everything = np.arange(len(points))
-        start = [
-            min(_CONDITIONAL_CANDIDATES if conditional else _FIRST_CANDIDATES, len(group[0]))
-            for group in self._groups
-        ]
+        if normals is not None or sides is not None:
+            for group in self._groups:
+                search(group, np.arange(len(points)), min(_CONDITIONAL_CANDIDATES, len(group[0])))
+        else:
+            self._search_exactly(search, best)
+        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
+        return SurfacePoints(triangle, barycentric, best)
+
+    def _search_exactly(self, search: Callable, best: np.ndarray) -> None:
+        """First a good bound from few candidates of every size, then what could be nearer still.
+
+        `best` (N,) holds the distances that `search` has found.
+        """
+        everything = np.arange(len(best))
+        start = [min(_FIRST_CANDIDATES, len(group[0])) for group in self._groups]
         reached = [search(g, everything, k) for g, k in zip(self._groups, start, strict=True)]
         for group, k, far in zip(self._groups, start, reached, strict=True):
             rows = everything
-            while not conditional and k < len(group[0]):
+            while k < len(group[0]):
                 open_rows = far < best[rows] + group[2]
                 rows = rows[open_rows]
                 if not len(rows):
                     break
                 k = min(3 * k, len(group[0]))
                 far = search(group, rows, k)
-        triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
-        return SurfacePoints(triangle, barycentric, best)
 
 
 @numba.njit(cache=True)
 def _closest_of(  # pragma: no cover - compiled
-    points, normals, labels, rows, candidates, corners, face_normals, face_labels,
+    points, normals, sides, rows, candidates, corners, face_normals, face_sides,
     min_cosine, best, triangle, barycentric,
 ):  # fmt: skip
     """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
@@ -135,7 +126,7 @@ def _closest_of(  # pragma: no cover - compiled
         nx, ny, nz = normals[row]
         least = best[row] ** 2
         for t in candidates[index]:
-            if labels[row] != 0 and face_labels[t] != 0 and labels[row] != face_labels[t]:
+            if sides[row] != 0 and face_sides[t] != 0 and sides[row] != face_sides[t]:
                 continue
             if min_cosine > -1.0:
                 fx, fy, fz = face_normals[t]
@@ -184,3 +175,28 @@ def _project(px, py, pz, abc):  # pragma: no cover - compiled
         return 0.0, 1.0 - w, w
     total = va + vb + vc
     return va / total, vb / total, vc / total
+
+
+def closest_barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Weights of the point of each triangle that is closest to the query beside it.
+
+    Args:
+        points: (N, 3) queries, any unit and frame.
+        corners: (N, 3, 3) corners of a triangle for each.
+
+    Returns:
+        (N, 3) barycentric weights (Ericson 2005, section 5.1.5).
+    """
+    return _closest_weights(
+        np.ascontiguousarray(points, np.float64), np.ascontiguousarray(corners, np.float64)
+    )
+
+
+@numba.njit(cache=True)
+def _closest_weights(points, corners):  # pragma: no cover - compiled
+    """`closest_barycentric`, compiled."""
+    weights = np.empty((len(points), 3))
+    for row in range(len(points)):
+        x, y, z = points[row]
+        weights[row, 0], weights[row, 1], weights[row, 2] = _project(x, y, z, corners[row])
+    return weights

@@ -9,7 +9,15 @@ _COTANGENT_RANGE = (0.02, 50.0)
 
 
 def cotangents(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Half the cotangent of the angle opposite each edge (12, 20, 01), (T, 3), kept positive."""
+    """Half the cotangent of the angle opposite each edge, kept positive.
+
+    Args:
+        vertices: (V, 3), any unit and frame.
+        triangles: (T, 3).
+
+    Returns:
+        (T, 3) of the edges 12, 20, 01 of each triangle.
+    """
     weights = np.empty((len(triangles), 3))
     for k in range(3):
         a, b, c = (vertices[triangles[:, (k + i) % 3]] for i in range(3))
@@ -23,7 +31,16 @@ def cotangents(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def edge_stiffness(
     triangles: np.ndarray, weights: np.ndarray, n_vertices: int
 ) -> sparse.csr_matrix:
-    """Matrix (V, V) of the energy sum w_ij |x_i - x_j|^2; weights (T, 3) of edges 12, 20, 01."""
+    """Matrix of the energy sum w_ij |x_i - x_j|^2 over the edges of a mesh.
+
+    Args:
+        triangles: (T, 3).
+        weights: (T, 3) of the edges 12, 20, 01 of each triangle.
+        n_vertices: V.
+
+    Returns:
+        (V, V) sparse, symmetric.
+    """
     first = triangles[:, [1, 2, 0]].ravel()
     second = triangles[:, [2, 0, 1]].ravel()
     values = weights.ravel()

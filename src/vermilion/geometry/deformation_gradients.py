@@ -6,10 +6,17 @@ import numpy as np
 
 
 def triangle_frames(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Frames [v2 - v1, v3 - v1, n / sqrt|n|] as columns, (..., T, 3, 3); `vertices` (..., V, 3).
+    """Frames [v2 - v1, v3 - v1, n / sqrt|n|] of triangles as columns.
 
     The third column points to the phantom vertex; its length is the root of twice the area, so
     that a uniform scale of the triangle scales all three columns alike.
+
+    Args:
+        vertices: (..., V, 3), any unit and frame.
+        triangles: (T, 3).
+
+    Returns:
+        (..., T, 3, 3).
     """
     first = vertices[..., triangles[:, 0], :]
     along = vertices[..., triangles[:, 1], :] - first
@@ -21,7 +28,7 @@ def triangle_frames(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def inverse_3x3(matrices: np.ndarray) -> np.ndarray:
-    """Inverse of (..., 3, 3) by cross products of the columns; NaN where singular."""
+    """Inverses (..., 3, 3) of matrices (..., 3, 3) by cross products of the columns; NaN if singular."""
     a, b, c = (matrices[..., :, k] for k in range(3))
     rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
     determinant = (a * rows[..., 0, :]).sum(axis=-1)
@@ -67,6 +74,7 @@ def correction_gradients(
     Args:
         coarse, accurate: (..., V, 3), meshes C_f and H_f.
         coarse_neutral, accurate_neutral: (V, 3), meshes C_0 and H_0.
+        triangles: (T, 3), of both.
 
     Returns:
         (..., T, 3, 3).

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.geometry.mesh import rigid_alignment
+from vermilion.geometry.alignment import move_frames
 
 
 def head_from_world(
     vertices_mm: np.ndarray, rotation: np.ndarray, translation_mm: np.ndarray
 ) -> np.ndarray:
-    """(F, V, 3) world -> head frame, float64; (F, 3, 3), (F, 3) are `world_from_head`."""
+    """Meshes of the world in the head frame.
+
+    Args:
+        vertices_mm: (F, V, 3) in the world, mm.
+        rotation, translation_mm: (F, 3, 3), (F, 3) `world_from_head`.
+
+    Returns:
+        (F, V, 3) float64 in the head frame, mm.
+    """
     centred = np.asarray(vertices_mm, np.float64) - translation_mm[:, None]
     return centred @ rotation
 
@@ -18,41 +26,13 @@ def head_from_world(
 def world_from_head(
     vertices_mm: np.ndarray, rotation: np.ndarray, translation_mm: np.ndarray
 ) -> np.ndarray:
-    """(F, V, 3) head frame -> world, float64."""
-    return (
-        np.asarray(vertices_mm, np.float64) @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
-    )
-
-
-def align_frames(
-    sequence_mm: np.ndarray, target_mm: np.ndarray, weight: np.ndarray, trim: float = 0.2
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bring each frame rigidly onto its target by some of the vertices.
-
-    Twice: the share `trim` of the vertices that fit worst is left out the second time (a brow that
-    moves, a forehead that was not seen).
+    """Meshes of the head frame in the world, the inverse of `head_from_world`.
 
     Args:
-        sequence_mm: (F, V, 3).
-        target_mm: (F, V, 3) or (V, 3).
-        weight: (V,) of each vertex in the least squares, bool or float; 0 leaves it out.
-        trim: 0 for once, with all vertices.
+        vertices_mm: (F, V, 3) in the head frame, mm.
+        rotation, translation_mm: (F, 3, 3), (F, 3) `world_from_head`.
 
     Returns:
-        ((F, V, 3) aligned, (F,) RMS mm of the vertices kept). NaN where a frame is not finite.
+        (F, V, 3) float64 in the world, mm.
     """
-    target, chosen = np.broadcast_to(target_mm, sequence_mm.shape), np.asarray(weight) > 0
-    aligned = np.full(sequence_mm.shape, np.nan)
-    error_mm = np.full(len(sequence_mm), np.nan)
-    for f in range(len(sequence_mm)):
-        source, goal = sequence_mm[f, chosen], target[f, chosen]
-        if not (np.isfinite(source).all() and np.isfinite(goal).all()):
-            continue
-        weights = np.asarray(weight, dtype=float)[chosen]
-        for _ in range(2 if trim > 0 else 1):
-            rotation, translation = rigid_alignment(source, goal, weights)
-            residual = np.linalg.norm(source @ rotation.T + translation - goal, axis=1)
-            error_mm[f] = np.sqrt(np.average(residual**2, weights=weights))
-            weights = weights * (residual <= np.quantile(residual, 1.0 - trim))
-        aligned[f] = sequence_mm[f] @ rotation.T + translation
-    return aligned, error_mm
+    return move_frames(vertices_mm, rotation, translation_mm)

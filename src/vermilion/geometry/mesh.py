@@ -28,41 +28,41 @@ class Mesh:
             raise ValueError(f"triangles must be (T, 3), got {self.triangles.shape}")
 
     def with_vertices(self, vertices_mm: np.ndarray) -> Mesh:
-        """The same topology at other positions, (V, 3)."""
+        """The same topology at other vertices_mm (V, 3)."""
         return Mesh(vertices_mm, self.triangles)
 
 
 def triangle_cross(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Normal of each triangle times twice its area, (..., T, 3); `vertices` is (..., V, 3)."""
+    """Normals of triangles (T, 3) times twice their area, (..., T, 3), of vertices (..., V, 3)."""
     a, b, c = (vertices[..., triangles[:, k], :] for k in range(3))
     return np.cross(b - a, c - a)
 
 
 def triangle_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals, (..., T, 3); zero for a triangle without area."""
+    """Unit normals of triangles (T, 3), (..., T, 3), of vertices (..., V, 3); zero without area."""
     return normalised(triangle_cross(vertices, triangles))
 
 
 def triangle_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Areas, (..., T), in the square of the vertices' unit."""
+    """Areas of triangles (T, 3), (..., T), in the squared unit of vertices (..., V, 3)."""
     return 0.5 * np.linalg.norm(triangle_cross(vertices, triangles), axis=-1)
 
 
 def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A third of the area of the triangles round each vertex, (V,)."""
+    """A third of the area of the triangles (T, 3) round each of the vertices (V, 3), (V,)."""
     areas = triangle_areas(vertices, triangles)
     weights = np.repeat(areas / 3.0, 3)
     return np.bincount(triangles.reshape(-1), weights=weights, minlength=len(vertices))
 
 
 def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area-weighted unit normals of the vertices, (V, 3)."""
+    """Area-weighted unit normals (V, 3) of vertices (V, 3) with triangles (T, 3)."""
     cross = triangle_cross(vertices, triangles)
     return normalised(incidence(triangles, len(vertices)) @ cross)
 
 
 def incidence(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
-    """(V, T) matrix with 1 where a triangle has a vertex."""
+    """(V, T) sparse matrix with 1 where a vertex belongs to a triangle of triangles (T, 3)."""
     n_triangles = len(triangles)
     columns = np.repeat(np.arange(n_triangles), 3)
     data = np.ones(3 * n_triangles)
@@ -71,13 +71,13 @@ def incidence(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
 
 
 def unique_edges(triangles: np.ndarray) -> np.ndarray:
-    """Undirected edges, (E, 2), lower vertex first, sorted."""
+    """Undirected edges (E, 2) of triangles (T, 3), lower vertex first, sorted."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     return np.unique(np.sort(edges, axis=1), axis=0)
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
-    """Directed edges that only one triangle has, (B, 2)."""
+    """Directed edges (B, 2) that only one of the triangles (T, 3) has."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     _, inverse, counts = np.unique(
         np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
@@ -86,7 +86,7 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
 
 
 def adjacency(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
-    """(V, V) symmetric matrix with 1 between neighbours."""
+    """(V, V) symmetric sparse matrix with 1 between neighbours by triangles (T, 3)."""
     edges = unique_edges(triangles)
     rows = np.concatenate([edges[:, 0], edges[:, 1]])
     columns = np.concatenate([edges[:, 1], edges[:, 0]])
@@ -111,26 +111,9 @@ def submesh(triangles: np.ndarray, keep_vertices: np.ndarray) -> tuple[np.ndarra
 
 
 def normalised(vectors: np.ndarray) -> np.ndarray:
-    """Unit vectors along the last axis; zero stays zero."""
+    """Unit vectors (..., D) of vectors (..., D); zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=float), where=length > 0)
-
-
-def rigid_alignment(
-    source: np.ndarray, target: np.ndarray, weights: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) that bring `source` (N, 3) onto `target` (N, 3).
-
-    Weighted least squares (Arun et al. 1987): target ~ source @ rotation.T + translation.
-    """
-    weights = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=float)
-    weights = weights / weights.sum()
-    source_mean, target_mean = weights @ source, weights @ target
-    covariance = ((source - source_mean) * weights[:, None]).T @ (target - target_mean)
-    u, _, vt = np.linalg.svd(covariance)
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
-    rotation = vt.T @ flip @ u.T
-    return rotation, target_mean - rotation @ source_mean
 
 
 def mesh_corners(triangles: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -139,5 +122,5 @@ def mesh_corners(triangles: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def topology_hash(triangles: np.ndarray) -> str:
-    """SHA-256 of the vertex numbers of a topology, independent of the integer type."""
+    """SHA-256 of the vertex numbers of triangles (T, 3), independent of the integer type."""
     return hashlib.sha256(np.ascontiguousarray(triangles, dtype="<i4").tobytes()).hexdigest()

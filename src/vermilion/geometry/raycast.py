@@ -27,6 +27,7 @@ class Hits:
 
     @property
     def hit(self) -> np.ndarray:
+        """(...) bool: rays that meet the mesh."""
         return self.triangle >= 0
 
 
@@ -34,6 +35,7 @@ class RayCaster:
     """An embree scene of one mesh; build it once a frame, cast from every camera."""
 
     def __init__(self, vertices_mm: np.ndarray, triangles: np.ndarray):
+        """Build the scene of vertices_mm (V, 3) in the world and triangles (T, 3)."""
         self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(
@@ -41,7 +43,15 @@ class RayCaster:
         )
 
     def cast(self, origins_mm: np.ndarray, directions: np.ndarray) -> Hits:
-        """First hit of rays (..., 3) with unit directions (..., 3)."""
+        """First hit of rays.
+
+        Args:
+            origins_mm: (3,) or (..., 3) in the mesh's world, mm.
+            directions: (..., 3) unit.
+
+        Returns:
+            hits (...).
+        """
         shape = directions.shape[:-1]
         origins = np.ascontiguousarray(
             np.broadcast_to(origins_mm, directions.shape).reshape(-1, 3), dtype=np.float32
@@ -61,7 +71,16 @@ class RayCaster:
     def occluded(
         self, origins_mm: np.ndarray, directions: np.ndarray, limit_mm: float = np.inf
     ) -> np.ndarray:
-        """Whether anything lies within `limit_mm` along each ray, (...,) bool."""
+        """Whether anything lies in the way of rays.
+
+        Args:
+            origins_mm: (3,) or (..., 3) in the mesh's world, mm.
+            directions: (..., 3) unit.
+            limit_mm: how far along the ray.
+
+        Returns:
+            (...) bool.
+        """
         if not np.isfinite(limit_mm):  # any hit serves, which is twice as quick
             shape = directions.shape[:-1]
             origins = np.broadcast_to(origins_mm, directions.shape).reshape(-1, 3)
@@ -77,7 +96,16 @@ class RayCaster:
     def visible(
         self, camera: Camera, points_mm: np.ndarray, tolerance_mm: float = 0.2
     ) -> np.ndarray:
-        """Which points (N, 3) on the surface the camera sees: in the image and not hidden."""
+        """Which points on the surface a camera sees: in the image and not hidden.
+
+        Args:
+            camera: in the mesh's world.
+            points_mm: (N, 3) on the mesh, world, mm.
+            tolerance_mm: how far in front of a point the mesh may lie.
+
+        Returns:
+            (N,) bool.
+        """
         pixels = camera.project(points_mm)
         inside = camera.in_image(pixels)
         towards = points_mm - camera.centre_mm
@@ -87,7 +115,16 @@ class RayCaster:
 
 
 def interpolate(hits: Hits, triangles: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Per-vertex `values` (V, ...) at the hits, (..., ...); zero where nothing is hit."""
+    """Values of vertices at the hits of rays.
+
+    Args:
+        hits: of rays (...).
+        triangles: (T, 3) of the mesh.
+        values: (V, D) or (V,) of its vertices.
+
+    Returns:
+        (..., D) or (...); zero where nothing is hit.
+    """
     hit = hits.triangle >= 0
     weights = hits.barycentric[hit]
     corners = values[triangles[hits.triangle[hit]]]

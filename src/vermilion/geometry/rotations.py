@@ -1,4 +1,4 @@
-"""Rotation logarithm and exponential, batched, stable at no turn and near half a turn.
+"""Rotations and rotation vectors, batched, stable at no turn and near half a turn.
 
 The logarithm goes over the unit quaternion (Shepperd 1978 for the branch), which loses no digits
 at either end; half a turn maps to one of its two equal logarithms.
@@ -12,7 +12,7 @@ _SMALL = 1e-4  # radians under which the series is exact to rounding
 
 
 def rotation_vector(rotations: np.ndarray) -> np.ndarray:
-    """Axis times angle, (..., 3) rad with length in [0, pi], of rotations (..., 3, 3)."""
+    """Logarithm: axis times angle, (..., 3) rad with length in [0, pi], of rotations (..., 3, 3)."""
     quaternion = unit_quaternion(rotations)
     w, imaginary = quaternion[..., 0], quaternion[..., 1:]
     sine = np.linalg.norm(imaginary, axis=-1)
@@ -56,18 +56,60 @@ def unit_quaternion(rotations: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrix(vectors: np.ndarray) -> np.ndarray:
-    """Matrix exponential, (..., 3, 3), of rotation vectors (..., 3) rad (Rodrigues)."""
+    """Exponential: rotations (..., 3, 3) of rotation vectors (..., 3) rad (Rodrigues)."""
     vectors = np.asarray(vectors, dtype=np.float64)
     angle = np.linalg.norm(vectors, axis=-1)
     half = np.sinc(angle / (2 * np.pi))  # sin(a/2) / (a/2)
     first = np.sinc(angle / np.pi)[..., None, None]
     second = (0.5 * half**2)[..., None, None]
-    cross = _cross_matrices(vectors)
+    cross = cross_matrix(vectors)
     return np.eye(3) + first * cross + second * (cross @ cross)
 
 
-def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
-    x, y, z = (vectors[..., k] for k in range(3))
+def cross_matrix(vectors: np.ndarray) -> np.ndarray:
+    """Matrices (..., 3, 3) with [v] w = v x w, of vectors (..., 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
     flat = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1)
     return flat.reshape(*vectors.shape[:-1], 3, 3)
+
+
+def left_jacobian(vectors: np.ndarray) -> np.ndarray:
+    """J with exp(v + dv) = exp(J dv) exp(v), (..., 3, 3), of rotation vectors (..., 3) rad."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    k = cross_matrix(vectors)
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
+    b = np.where(small, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
+    return np.eye(3) + a * k + b * (k @ k)
+
+
+def nearest_rotation(matrices: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) nearest to matrices (..., 3, 3), by singular values (Arun et al. 1987)."""
+    u, _, vt = np.linalg.svd(matrices)
+    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    return u @ vt
+
+
+def mean_rotation(rotations: np.ndarray) -> np.ndarray:
+    """Chordal mean (3, 3) of rotations (F, 3, 3)."""
+    return nearest_rotation(rotations.mean(axis=0))
+
+
+def log_about_mean(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation vectors about the mean: rotation = exp(vector) @ mean.
+
+    Args:
+        rotations: (M, 3, 3).
+
+    Returns:
+        vectors (M, 3) rad, mean (3, 3).
+    """
+    mean = mean_rotation(rotations)
+    return rotation_vector(rotations @ mean.T), mean
+
+
+def exp_about_mean(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """The inverse of `log_about_mean`: (..., 3, 3), of vectors (..., 3) rad and a mean (3, 3)."""
+    return rotation_matrix(vectors) @ mean

@@ -32,9 +32,14 @@ class CholeskyFactor:
 def cotangent_laplacian(
     vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
-    """Intrinsic (tufted) cotangent Laplacian L (positive semi-definite) and mass M, both (V, V).
+    """Intrinsic (tufted) cotangent Laplacian, safe on bad triangles (Sharp and Crane 2020).
 
-    Sharp and Crane 2020, through robust_laplacian; safe on bad triangles.
+    Args:
+        vertices: (V, 3), mm, any frame.
+        triangles: (T, 3).
+
+    Returns:
+        Laplacian (V, V), positive semi-definite, and diagonal mass (V, V), mm2.
     """
     import robust_laplacian
 

@@ -1,36 +1,117 @@
-"""Points on a triangle mesh that move with it, and the search for the closest of them."""
+"""Points on a triangle mesh: a triangle and barycentric coordinates, so that they move with it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from scipy.spatial import cKDTree
-
-from vermilion.geometry.mesh import Mesh, triangle_normals
 
 
 @dataclass(frozen=True)
-class SurfaceMap:
-    """N points bound to a mesh.
+class SurfacePoints:
+    """N points on a triangle mesh: the one convention, used by every room.
 
     Attributes:
-        triangle: (N,) int32 triangle of the mesh, -1 for a point that is bound to nothing.
-        barycentric: (N, 3) float64 weights of the triangle's corners.
+        triangle: (N,) int, row of the mesh's triangles; -1 for a point that is bound to nothing.
+        barycentric: (N, 3) float, weights of the triangle's corners; they sum to 1.
+        distance_mm: (N,) float, mm to the query that was bound, infinite where unbound; None where
+            the points were not found by a search.
     """
 
     triangle: np.ndarray
     barycentric: np.ndarray
+    distance_mm: np.ndarray | None = None
+
+    @classmethod
+    def at_vertices(cls, vertices: np.ndarray, triangles: np.ndarray) -> SurfacePoints:
+        """Bind to mesh vertices, each through some triangle that has it, with weight 1.
+
+        Args:
+            vertices: (N,) vertex ids, each of some triangle.
+            triangles: (T, 3) of the mesh.
+
+        Returns:
+            N points.
+        """
+        flat = triangles.reshape(-1)
+        order = np.argsort(flat, kind="stable")
+        place = order[np.searchsorted(flat, vertices, sorter=order)]
+        barycentric = np.zeros((len(vertices), 3))
+        barycentric[np.arange(len(vertices)), place % 3] = 1.0
+        return cls((place // 3).astype(np.int32), barycentric)
+
+    @classmethod
+    def on_edges(
+        cls, start: np.ndarray, end: np.ndarray, fraction: np.ndarray, triangles: np.ndarray
+    ) -> SurfacePoints:
+        """Bind to mesh edges, each through some triangle that has it; the third weight is 0.
+
+        Args:
+            start, end: (N,) vertex ids of edges of the mesh; twice the same for a vertex.
+            fraction: (N,) in [0, 1], the way from start to end.
+            triangles: (T, 3) of the mesh.
+
+        Returns:
+            N points.
+        """
+        first = np.concatenate([triangles, triangles], axis=1).reshape(-1).astype(np.int64)
+        second = np.concatenate([np.roll(triangles, -1, axis=1), triangles], axis=1).reshape(-1)
+        count = int(triangles.max()) + 1
+        keys = np.minimum(first, second) * count + np.maximum(first, second)
+        order = np.argsort(keys, kind="stable")
+        wanted = np.minimum(start, end).astype(np.int64) * count + np.maximum(start, end)
+        triangle = order[np.searchsorted(keys, wanted, sorter=order)] // 6
+        corners, rows = triangles[triangle], np.arange(len(triangle))
+        barycentric = np.zeros((len(triangle), 3))
+        barycentric[rows, (corners == np.asarray(end)[:, None]).argmax(axis=1)] = fraction
+        barycentric[rows, (corners == np.asarray(start)[:, None]).argmax(axis=1)] += 1 - fraction
+        return cls(triangle.astype(np.int32), barycentric)
 
     @property
     def bound(self) -> np.ndarray:
-        """(N,) bool."""
+        """(N,) bool: points that lie on a triangle."""
         return self.triangle >= 0
 
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    def __getitem__(self, rows: np.ndarray | slice) -> SurfacePoints:
+        distance = None if self.distance_mm is None else self.distance_mm[rows]
+        return SurfacePoints(self.triangle[rows], self.barycentric[rows], distance)
+
+    def restricted(self, kept: np.ndarray) -> SurfacePoints:
+        """The same points, unbound where they are not `kept` (N,) bool."""
+        distance = self.distance_mm
+        return replace(
+            self,
+            triangle=np.where(kept, self.triangle, -1),
+            distance_mm=None if distance is None else np.where(kept, distance, np.inf),
+        )
+
+    def corners(self, triangles: np.ndarray) -> np.ndarray:
+        """Ids (N, 3) of the vertices between which the points lie, by the mesh's triangles (T, 3).
+
+        Those of triangle 0 where unbound.
+        """
+        return triangles[np.maximum(self.triangle, 0)]
+
+    def vertices(self, triangles: np.ndarray) -> np.ndarray:
+        """Ids (n,), ascending, of the vertices with a weight in any point, by triangles (T, 3)."""
+        carried = self.bound[:, None] & (self.barycentric > 0)
+        return np.unique(self.corners(triangles)[carried])
+
     def sample(self, values: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-        """Per-vertex `values` (..., V, D) at the points, (..., N, D) float64; NaN where unbound."""
-        corners = triangles[np.maximum(self.triangle, 0)]
+        """Values of vertices, interpolated at the points.
+
+        Args:
+            values: (..., V, D), of whatever unit and frame.
+            triangles: (T, 3) of the mesh.
+
+        Returns:
+            (..., N, D) float64; NaN where unbound.
+        """
+        corners = self.corners(triangles)
         points = sum(
             np.asarray(values[..., corners[:, k], :], np.float64) * self.barycentric[:, k, None]
             for k in range(3)
@@ -38,89 +119,11 @@ class SurfaceMap:
         return np.where(self.bound[:, None], points, np.nan)
 
     def matrix(self, triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
-        """(N, V) matrix that samples; rows of unbound points are zero."""
-        rows = np.repeat(np.arange(len(self.triangle)), 3)
-        columns = triangles[np.maximum(self.triangle, 0)].reshape(-1)
+        """Sparse matrix (N, V) that samples values of vertices, by the mesh's triangles (T, 3).
+
+        Rows of unbound points are zero.
+        """
+        rows = np.repeat(np.arange(len(self)), 3)
+        columns = self.corners(triangles).reshape(-1)
         data = (self.barycentric * self.bound[:, None]).reshape(-1)
-        return sparse.csr_matrix((data, (rows, columns)), shape=(len(self.triangle), n_vertices))
-
-
-def at_vertices(vertices: np.ndarray, triangles: np.ndarray) -> SurfaceMap:
-    """Bind to mesh vertices (N,): each through some triangle that has it, its weight being 1."""
-    flat = triangles.reshape(-1)
-    order = np.argsort(flat, kind="stable")
-    place = order[np.searchsorted(flat, vertices, sorter=order)]
-    barycentric = np.zeros((len(vertices), 3))
-    barycentric[np.arange(len(vertices)), place % 3] = 1.0
-    return SurfaceMap((place // 3).astype(np.int32), barycentric)
-
-
-def closest_on_surface(
-    points_mm: np.ndarray,
-    mesh: Mesh,
-    *,
-    normals: np.ndarray | None = None,
-    max_angle_deg: float = 70.0,
-    sides: np.ndarray | None = None,
-    triangle_sides: np.ndarray | None = None,
-    candidates: int = 32,
-) -> tuple[SurfaceMap, np.ndarray]:
-    """Closest point of a mesh for each of (N, 3) points, among compatible triangles.
-
-    Args:
-        normals: (N, 3) unit normals; a triangle whose normal differs by more than `max_angle_deg`
-            is not compatible.
-        sides, triangle_sides: (N,), (T,) in -1, 0, 1: lower lip, neither, upper lip; the two lips
-            are not compatible.
-        candidates: triangles looked at for each point, nearest centre first.
-
-    Returns:
-        (map, distance (N,) mm; unbound and infinite where no candidate is compatible).
-    """
-    triangles = mesh.triangles
-    corners = mesh.vertices_mm[triangles]
-    candidates = min(candidates, len(triangles))
-    _, near = cKDTree(corners.mean(axis=1)).query(points_mm, k=candidates)
-    near = near.reshape(len(points_mm), candidates)
-    barycentric = closest_barycentric(points_mm[:, None], corners[near])
-    found = (barycentric[..., None] * corners[near]).sum(axis=-2)
-    distance = np.linalg.norm(found - points_mm[:, None], axis=-1)
-    if normals is not None:
-        facing = (triangle_normals(mesh.vertices_mm, triangles)[near] * normals[:, None]).sum(-1)
-        distance[facing < np.cos(np.deg2rad(max_angle_deg))] = np.inf
-    if sides is not None and triangle_sides is not None:
-        distance[sides[:, None] * triangle_sides[near] < 0] = np.inf
-    best = np.argmin(distance, axis=1)
-    index = np.arange(len(points_mm))
-    distance = distance[index, best]
-    triangle = np.where(np.isfinite(distance), near[index, best], -1).astype(np.int32)
-    return SurfaceMap(triangle, barycentric[index, best]), distance
-
-
-def closest_barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Weights of the closest point of triangles, (..., 3); points (..., 3), corners (..., 3, 3).
-
-    Ericson 2005, section 5.1.5, without branches: the plane's foot point where it lies inside,
-    else the closest of the three edges' closest points.
-    """
-    a, b, c = (corners[..., k, :] for k in range(3))
-    ab, ac, ap = b - a, c - a, points - a
-    d00, d01, d11 = (ab * ab).sum(-1), (ab * ac).sum(-1), (ac * ac).sum(-1)
-    d20, d21 = (ap * ab).sum(-1), (ap * ac).sum(-1)
-    determinant = np.maximum(d00 * d11 - d01 * d01, 1e-300)
-    v = (d11 * d20 - d01 * d21) / determinant
-    w = (d00 * d21 - d01 * d20) / determinant
-    inside = np.stack([1 - v - w, v, w], axis=-1)
-    options, distances = [inside], [np.where((inside >= 0).all(-1), -1.0, np.inf)]
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        start, along = corners[..., i, :], corners[..., j, :] - corners[..., i, :]
-        length = np.maximum((along * along).sum(-1), 1e-300)
-        t = np.clip(((points - start) * along).sum(-1) / length, 0, 1)
-        weights = np.zeros_like(inside)
-        weights[..., i], weights[..., j] = 1 - t, t
-        options.append(weights)
-        offset = start + t[..., None] * along - points
-        distances.append((offset * offset).sum(-1))
-    best = np.argmin(np.stack(distances, axis=-1), axis=-1)
-    stacked = np.stack(options, axis=-2)
-    return np.take_along_axis(stacked, best[..., None, None], axis=-2)[..., 0, :]
+        return sparse.csr_matrix((data, (rows, columns)), shape=(len(self), n_vertices))

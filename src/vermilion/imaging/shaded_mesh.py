@@ -23,11 +23,18 @@ def shade(
     colours: np.ndarray,
     opacity: float,
 ) -> np.ndarray:
-    """A shaded mesh over (h, w, 3) uint8: light from the upper left, a soft sheen, dark insides.
+    """A shaded mesh over an image: light from the upper left, a soft sheen, dark insides.
 
     Args:
-        vertices_mm: (V, 3) world; triangles: (T, 3); colours: (V, 3) in [0, 1].
+        image: (h, w, 3) uint8.
+        camera: of the image.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        colours: (V, 3) in [0, 1].
         opacity: 0 to 1.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     origins, directions = camera.rays(camera.pixel_grid())
     hits = RayCaster(vertices_mm, triangles).cast(origins, directions)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from vermilion.imaging.sampling import sample_bilinear
+
 #: Luminance of linear RGB (ITU-R BT.709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
@@ -14,22 +16,7 @@ def sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:
 
     Float32 (..., [c]); the border is repeated.
     """
-    flat = np.ascontiguousarray(points, dtype=np.float32).reshape(-1, 2) - np.float32(0.5)
-    flat = np.nan_to_num(flat, nan=-1.0)
-    # cv2.remap takes no more than 32767 rows or columns: work in rows of 1024.
-    n_rows = max(1, -(-len(flat) // 1024))
-    padded = np.zeros((n_rows * 1024, 2), dtype=np.float32)
-    padded[: len(flat)] = flat
-    grid = padded.reshape(n_rows, 1024, 2)
-    values = cv2.remap(
-        np.ascontiguousarray(image, dtype=np.float32),
-        np.ascontiguousarray(grid[..., 0]),
-        np.ascontiguousarray(grid[..., 1]),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    values = values.reshape(n_rows * 1024, *image.shape[2:])[: len(flat)]
-    return values.reshape(*points.shape[:-1], *image.shape[2:])
+    return sample_bilinear(np.asarray(image, np.float32), np.asarray(points, np.float32))
 
 
 def blur(values: np.ndarray, sigma: float) -> np.ndarray:

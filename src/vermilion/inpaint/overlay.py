@@ -23,12 +23,6 @@ def before_after(
     return np.vstack([label(pair[0], f"{frame}"), pair[1]])
 
 
-def sample_frames(frames: Sequence[int], count: int) -> list[int]:
-    """About `count` frames spread evenly, the first and the last among them."""
-    places = np.unique(np.linspace(0, len(frames) - 1, min(count, len(frames))).round().astype(int))
-    return [frames[i] for i in places]
-
-
 def sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
     """Tiles side by side; a note where there are none."""
     if not tiles:

@@ -11,6 +11,7 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import KeyFrames
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
 _DETECTED, _CORRECTED, _LIPS = (255, 60, 40), (60, 255, 60), (255, 255, 0)
@@ -33,7 +34,7 @@ def correction_overlay(
     Args:
         detected: of the same frames or more.
     """
-    rows = np.unique(np.linspace(0, len(corrected.frames) - 1, count).round().astype(int))
+    rows = evenly_spaced(len(corrected.frames), count)
     kinds = dict(zip(keys.frames.tolist(), keys.kinds.tolist(), strict=True))
     images = []
     for row in rows:

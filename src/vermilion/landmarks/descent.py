@@ -32,14 +32,14 @@ def stage_sizes(n_stages: int) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class Similarity:
+class ImageSimilarity:
     """Image pixels = scale * turn @ upright + shift, turn by (cos, sin) in `matrix` (2, 2)."""
 
     matrix: np.ndarray
     shift: np.ndarray
 
     @classmethod
-    def between(cls, source: np.ndarray, target: np.ndarray) -> Similarity:
+    def between(cls, source: np.ndarray, target: np.ndarray) -> ImageSimilarity:
         """Least squares, of points (N, 2) to points (N, 2)."""
         a, b = source - source.mean(axis=0), target - target.mean(axis=0)
         za, zb = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
@@ -51,7 +51,7 @@ class Similarity:
         return points @ self.matrix.T + self.shift
 
 
-def upright_channels(grey: np.ndarray, to_image: Similarity, size_px: int) -> np.ndarray:
+def upright_channels(grey: np.ndarray, to_image: ImageSimilarity, size_px: int) -> np.ndarray:
     """Blurred orientation channels of the image resampled into the mean shape's frame.
 
     The mean shape has size 1 about the origin; `size_px` pixels are 1, the origin in the middle.
@@ -78,7 +78,7 @@ def upright_channels(grey: np.ndarray, to_image: Similarity, size_px: int) -> np
 
 def shape_features(grey: np.ndarray, shape: np.ndarray, mean: np.ndarray, size_px: int):
     """Features (66, 128) round a shape (66, 2) px, and the similarity from the mean's frame."""
-    to_image = Similarity.between(mean, shape)
+    to_image = ImageSimilarity.between(mean, shape)
     channels = upright_channels(grey, to_image, size_px)
     local = (shape - to_image.shift) @ np.linalg.inv(to_image.matrix).T
     pixels = local * size_px + channels.shape[0] / 2 - 0.5

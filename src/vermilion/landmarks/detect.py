@@ -11,6 +11,7 @@ from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -50,7 +51,7 @@ def landmark_overlay(
     source: FrameSource, camera: str, track: LandmarkTrack, count: int = 8, columns: int = 4
 ) -> np.ndarray:
     """Frames of a track, evenly spread, with their landmarks; (h, w, 3) uint8."""
-    rows = np.unique(np.linspace(0, len(track.frames) - 1, count).round().astype(int))
+    rows = evenly_spaced(len(track.frames), count)
     images = []
     for row in rows:
         frame = int(track.frames[row])

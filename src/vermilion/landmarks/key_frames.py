@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from vermilion.landmarks.appearance import AppearanceSettings, ReferenceShape, describe
-from vermilion.landmarks.descent import Similarity
+from vermilion.landmarks.descent import ImageSimilarity
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import N_LANDMARKS
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -183,8 +183,8 @@ def without_offset(track: LandmarkTrack, given: Mapping[int, np.ndarray]) -> Lan
     offsets = []
     for row in rows:
         off = given[int(track.frames[row])] - track.points_px[row]
-        offsets.append(off @ Similarity.between(track.points_px[row], reference).matrix.T)
+        offsets.append(off @ ImageSimilarity.between(track.points_px[row], reference).matrix.T)
     offset, points = np.mean(offsets, axis=0), track.points_px.copy()
     for row in np.flatnonzero(track.valid):
-        points[row] += offset @ Similarity.between(reference, points[row]).matrix.T
+        points[row] += offset @ ImageSimilarity.between(reference, points[row]).matrix.T
     return replace(track, points_px=points)

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.descent import (
     DescentDetector,
-    Similarity,
+    ImageSimilarity,
     shape_features,
     stage_sizes,
 )
@@ -20,6 +20,7 @@ from vermilion.landmarks.labels import LandmarkLabel
 from vermilion.landmarks.locate import train_locator
 from vermilion.landmarks.scheme import MIRROR, N_LANDMARKS, face_size_px
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.progress import progress
 
 #: A point this far off (face sizes) is half as sure as one in place.
@@ -54,7 +55,7 @@ def labelled_images(
             "at least ten, better a hundred",
             "Add files to labels/landmarks/<camera>/ of the takes in landmarks.training_takes.",
         )
-    chosen = np.unique(np.linspace(0, len(labels) - 1, max_frames).round().astype(int))
+    chosen = evenly_spaced(len(labels), max_frames)
     images, points = [], []
     for index in chosen:
         source, label = labels[index]
@@ -116,11 +117,11 @@ def mean_shape(points: np.ndarray, rounds: int = 5) -> np.ndarray:
     """Mean of shapes (N, 66, 2) after similarity alignment: size 1, box about the origin."""
     mean = _normalised(points[0])
     for _ in range(rounds):
-        aligned = [Similarity.between(shape, mean)(shape) for shape in points]
+        aligned = [ImageSimilarity.between(shape, mean)(shape) for shape in points]
         mean = _normalised(np.mean(aligned, axis=0))
     # Upright: what is left of the first shape's turn is taken out by symmetry.
     mirror = mean[MIRROR] * [-1, 1]
-    return _normalised(0.5 * (mean + Similarity.between(mirror, mean)(mirror)))
+    return _normalised(0.5 * (mean + ImageSimilarity.between(mirror, mean)(mirror)))
 
 
 def _normalised(shape: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ import numpy as np
 from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import Reference
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.refine import register_frame
+from vermilion.multiview.refine import FrameMatchSettings, register_frame
 from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
 
@@ -104,14 +104,8 @@ def find_anchor(
     number = int(window[best])
     frame = load(number)
     levels = [(reference, frame, 2 * settings.length_mm), (reference, frame, settings.length_mm)]
-    found = register_frame(
-        levels,
-        reference.vertices_mm,
-        matcher,
-        sigma_px=settings.sigma_px,
-        max_step_mm=settings.max_step_mm,
-        min_agreement=settings.min_agreement,
-    )
+    match = FrameMatchSettings(settings.sigma_px, settings.max_step_mm, settings.min_agreement)
+    found = register_frame(levels, reference.vertices_mm, matcher, match)
     return Anchor(number, found.vertices_mm, window, similarity)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from vermilion.faces.lips import lip_sides_by_distance
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import adjacency, vertex_normals
+from vermilion.geometry.mesh import Mesh, adjacency, vertex_normals
 
 
 @dataclass(frozen=True)
@@ -26,22 +26,9 @@ class Lips:
 
 
 def lips_of(model: FaceModel, corner_mm: float = 4.0) -> Lips:
-    """Split the lips: a vertex belongs to the side whose vermilion is nearer over the surface."""
-    near = adjacency(model.triangles, model.n_vertices).tocoo()
-    length = np.linalg.norm(model.neutral_mm[near.row] - model.neutral_mm[near.col], axis=1)
-    near.data = length
-    graph = near.tocsr()
-    upper_red, lower_red = model.regions["vermilion_upper"], model.regions["vermilion_lower"]
-    to_upper, to_lower = (
-        dijkstra(graph, indices=np.flatnonzero(red), min_only=True)
-        for red in (upper_red, lower_red)
-    )
-    lips = upper_red | lower_red | model.regions["mouth_inner"]
-    clear = lips & (np.abs(to_upper - to_lower) > corner_mm)
-    return Lips(
-        np.flatnonzero(clear & (to_upper < to_lower)),
-        np.flatnonzero(clear & (to_lower < to_upper)),
-    )
+    """The two lips of a face model, without what lies within `corner_mm` of their corners."""
+    sides = lip_sides_by_distance(Mesh(model.neutral_mm, model.triangles), model.regions, corner_mm)
+    return Lips(np.flatnonzero(sides > 0), np.flatnonzero(sides < 0))
 
 
 @dataclass(frozen=True)
@@ -74,6 +61,9 @@ def resolve_contact(
     """Push apart what lies inside the other lip, each side by its share of mobility.
 
     Args:
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        lips: of the topology.
         mobility: (V,) in (0, 1]; vertices that cameras see move less.
         reach_mm: deeper than this is no contact of these two surfaces.
         slack_mm: depth that is let be.

@@ -60,7 +60,7 @@ class Origin:
 
     @classmethod
     def of(cls, frame: Frame, neutral_mm: np.ndarray, model: FaceModel) -> Origin:
-        """From the neutral's frame and mesh (V, 3)."""
+        """From the neutral's frame and its mesh neutral_mm (V, 3), world."""
         neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         named = model.regions
         regions = {
@@ -130,7 +130,7 @@ def carry(
 
 
 def neighbours(frame: Frame, target_mm: np.ndarray) -> dict[str, str]:
-    """Camera -> the other camera of a frame that sees a point from the nearest direction.
+    """Camera -> the other camera of a frame that sees target_mm (3,) from the nearest direction.
 
     Cameras of like resolution go first.
     """

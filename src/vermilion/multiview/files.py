@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.landmarks.scheme import JAW
 from vermilion.landmarks.views import LandmarkViews
 from vermilion.multiview.anchors import Anchor
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.track import Clip, Track
-from vermilion.multiview.triangulate import SLIDING
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 
@@ -35,14 +35,14 @@ def read_views(
             path=path,
         )
     confidence = views.confidence[use].astype(np.float64)
-    confidence[:, SLIDING] = 0.0
+    confidence[:, JAW] = 0.0  # its silhouette slides over the skin from view to view
     return [names[index] for index in use], views.points_px[use].astype(float), confidence
 
 
 def write_neutral(path: str | Path, neutral: Neutral) -> None:
     """`.npz`: vertices_mm (V, 3); information (V,) 1/mm^2; landmarks_mm (66, 3), NaN unknown;
     first_take, moved_mm (V,) of a later take of the person."""
-    _save(
+    write_arrays(
         path,
         vertices_mm=neutral.vertices_mm,
         information_per_mm2=neutral.information,
@@ -70,7 +70,7 @@ def read_neutral(path: str | Path, n_vertices: int, **place) -> np.ndarray:
 
 def write_anchor(path: str | Path, anchor: Anchor) -> None:
     """`.npz`: frame; vertices_mm (V, 3); window, similarity (W,)."""
-    _save(
+    write_arrays(
         path,
         frame=np.array(anchor.frame),
         vertices_mm=anchor.vertices_mm,
@@ -87,7 +87,7 @@ def read_anchor(path: str | Path) -> Anchor:
 
 def write_clip(path: str | Path, clip: Clip) -> None:
     """`.npz`: frames (F,); coarse_mm (F, V, 3) float32; reasons."""
-    _save(
+    write_arrays(
         path,
         frames=clip.frames,
         coarse_mm=clip.coarse_mm.astype(np.float32),
@@ -104,7 +104,7 @@ def read_clip(path: str | Path) -> Clip:
 
 def write_track(path: str | Path, track: Track) -> None:
     """`.npz`: frames, coarse_mm (F, V, 3) float32, similarity, anchors, reasons."""
-    _save(
+    write_arrays(
         path,
         frames=track.frames,
         coarse_mm=track.coarse_mm,
@@ -133,10 +133,6 @@ def read_anchors(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(frames (F,), similarity (F,), anchors (F,) bool) of a track."""
     arrays = _load(path, ("frames", "similarity", "anchors"))
     return arrays["frames"], arrays["similarity"], arrays["anchors"]
-
-
-def _save(path, **arrays) -> None:
-    write_arrays(path, **arrays)
 
 
 def _load(path, names) -> dict[str, np.ndarray]:

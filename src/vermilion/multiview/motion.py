@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
@@ -42,6 +43,14 @@ class Reference:
         triangles: np.ndarray,
         plate: ThinPlate | None = None,
     ) -> Reference:
+        """Of a frame and its mesh.
+
+        Args:
+            frame: with its images.
+            vertices_mm: (V, 3) world, mm.
+            triangles: (T, 3).
+            plate: of the neutral; None: the mesh is the neutral.
+        """
         vertices_mm = np.asarray(vertices_mm, dtype=np.float64)
         plate = ThinPlate.of(vertices_mm, triangles) if plate is None else plate
         sights = see_all(frame, vertices_mm, triangles)
@@ -54,7 +63,7 @@ class Reference:
 
 
 def see_all(frame: Frame, vertices_mm: np.ndarray, triangles: np.ndarray) -> dict[str, Sight]:
-    """Sight of every camera of a frame."""
+    """What every camera of a frame sees of a mesh, vertices_mm (V, 3) world, triangles (T, 3)."""
     caster = RayCaster(vertices_mm, triangles)
     normals = vertex_normals(vertices_mm, triangles)
     return {
@@ -78,6 +87,21 @@ class Measurements:
 
 
 @dataclass(frozen=True)
+class CloudData:
+    """Stereo points of a frame that may pull at its mesh.
+
+    Attributes:
+        cloud: near the mesh, world.
+        allowed: (V,) bool, vertices that it may pull.
+        gate_mm: how near the points of a vertex lie.
+    """
+
+    cloud: Cloud
+    allowed: np.ndarray
+    gate_mm: float
+
+
+@dataclass(frozen=True)
 class PlaneData:
     """Point-to-plane data: `normals @ step` should be `heights_mm`.
 
@@ -90,6 +114,29 @@ class PlaneData:
     normals: np.ndarray
     heights_mm: np.ndarray
     weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class SolveSettings:
+    """How a step is solved for.
+
+    Attributes:
+        length_mm: stiffness (see `solver`).
+        px_per_mm: of the median camera; a row of it weighs one.
+        sigma_px: expected error of a measurement.
+        max_step_mm: longest step of a vertex.
+        keep_shape: pull towards the shape at rest; else only the step is smooth.
+        rounds: of re-weighting.
+        tolerance: of the solver.
+    """
+
+    length_mm: float
+    px_per_mm: float
+    sigma_px: float
+    max_step_mm: float
+    keep_shape: bool = True
+    rounds: int = 3
+    tolerance: float = 1e-4
 
 
 @dataclass(frozen=True)
@@ -111,33 +158,26 @@ def solve_motion(
     plate: ThinPlate,
     current_mm: np.ndarray,
     measured: Measurements,
-    length_mm: float,
-    *,
-    px_per_mm: float,
-    sigma_px: float,
-    max_step_mm: float,
+    settings: SolveSettings,
     planes: PlaneData | None = None,
-    keep_shape: bool = True,
-    rounds: int = 3,
-    tolerance: float = 1e-4,
 ) -> Solution:
     """Step of all vertices by iteratively re-weighted least squares (Cauchy weights).
 
     Args:
         plate: the prior.
-        current_mm: (V, 3).
-        length_mm: stiffness (see `solver`).
-        px_per_mm: of the median camera; a row of it weighs one.
-        sigma_px: expected error of a measurement.
-        max_step_mm: longest step of a vertex.
+        current_mm: (V, 3) the mesh now, world, mm.
+        measured: of C cameras at its vertices.
+        settings: stiffness, weights and rounds.
         planes: further data, for instance of the frame's point cloud.
-        keep_shape: pull towards the shape at rest; else only the step is smooth.
+
+    Returns:
+        the step (V, 3) and how well it explains the measurements.
     """
-    missing = plate.missing(current_mm) if keep_shape else None
+    missing = plate.missing(current_mm) if settings.keep_shape else None
     solver, step, robust = None, None, measured.weights
-    jacobians = measured.jacobians / px_per_mm
-    offsets = measured.offsets_px / px_per_mm
-    for _ in range(rounds):
+    jacobians = measured.jacobians / settings.px_per_mm
+    offsets = measured.offsets_px / settings.px_per_mm
+    for _ in range(settings.rounds):
         weighted = (jacobians * robust[..., None, None]).transpose(1, 3, 0, 2)
         flat = jacobians.transpose(1, 0, 2, 3)
         n = len(current_mm)
@@ -149,40 +189,47 @@ def solve_motion(
             blocks = blocks + planes.weights[:, None, None] * outer
             right = right + (planes.weights * planes.heights_mm)[:, None] * planes.normals
         if solver is None:
-            solver = DisplacementSolver(plate, blocks, length_mm, tolerance=tolerance)
+            solver = DisplacementSolver(
+                plate, blocks, settings.length_mm, tolerance=settings.tolerance
+            )
         step = solver.solve(blocks, right, missing, step)
         explained = (flat @ step[:, :, None]).reshape(n, -1, 2).transpose(1, 0, 2)
-        left = np.linalg.norm(explained - offsets, axis=2) * px_per_mm
-        robust = measured.weights / (1 + (left / (3 * sigma_px)) ** 2)
+        left = np.linalg.norm(explained - offsets, axis=2) * settings.px_per_mm
+        robust = measured.weights / (1 + (left / (3 * settings.sigma_px)) ** 2)
     length = np.linalg.norm(step, axis=1, keepdims=True)
-    step = step * np.minimum(1.0, max_step_mm / np.maximum(length, 1e-12))
+    step = step * np.minimum(1.0, settings.max_step_mm / np.maximum(length, 1e-12))
     return Solution(step, robust, left)
 
 
 def cloud_planes(
     vertices_mm: np.ndarray,
     normals: np.ndarray,
-    cloud: Cloud,
-    allowed: np.ndarray,
-    *,
+    data: CloudData,
     sigma_mm: float,
-    gate_mm: float,
     neighbours: int = 8,
 ) -> PlaneData:
     """Heights of a frame's stereo points over the mesh, at the vertices.
 
-    Each vertex takes the median of its nearest points that lie within `gate_mm`; `sigma_mm` is
-    the error that weighs one.
-    """
-    from scipy.spatial import cKDTree
+    Each vertex takes the median of its nearest points that lie within the gate.
 
+    Args:
+        vertices_mm: (V, 3) world, mm.
+        normals: (V, 3) unit.
+        data: the points, and the vertices that they may pull.
+        sigma_mm: the error of a point that weighs one.
+        neighbours: points of a vertex; with fewer than half of them it has no height.
+
+    Returns:
+        heights (V,) mm along the normals, weight 0 where there is none.
+    """
+    cloud = data.cloud
     n = len(vertices_mm)
     heights, weights = np.zeros(n), np.zeros(n)
     if len(cloud) < neighbours:
         return PlaneData(normals, heights, weights)
-    ids = np.flatnonzero(allowed)
+    ids = np.flatnonzero(data.allowed)
     distance, near = cKDTree(cloud.points_mm).query(
-        vertices_mm[ids], k=neighbours, distance_upper_bound=gate_mm
+        vertices_mm[ids], k=neighbours, distance_upper_bound=data.gate_mm
     )
     found = np.isfinite(distance)
     near = np.where(found, near, 0)

@@ -15,25 +15,11 @@ from vermilion.multiview.pairs import candidate_pairs, stereo_pairs
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.polish import polish
 from vermilion.multiview.solver import ThinPlate
-from vermilion.multiview.stereo import Cloud, match_pair
+from vermilion.multiview.stereo import Cloud, StereoSettings, match_pair
 from vermilion.multiview.template_fit import deform_to_landmarks, fit_template
 from vermilion.multiview.triangulate import Triangulated
 from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
-
-
-@dataclass(frozen=True)
-class StereoSettings:
-    """Dense matching; see `vermilion.config.multiview` for meanings and units."""
-
-    pairs: Sequence[tuple[str, str]]
-    reach_mm: float
-    block_px: int
-    uniqueness_percent: int
-    consistency_px: float
-    speckle_px: int
-    min_texture: float
-    spacing_mm: float
 
 
 @dataclass(frozen=True)
@@ -79,25 +65,18 @@ class Neutral:
 
 
 def stereo_cloud(frame: Frame, target_mm: np.ndarray, settings: StereoSettings) -> Cloud:
-    """Points of all stereo pairs of a frame within reach of a point, not yet gated or fused."""
+    """Points of all stereo pairs of a frame within reach of target_mm (3,), not gated or fused."""
     cameras = {name: view.camera for name, view in frame.views.items()}
     listed = [pair for pair in settings.pairs if all(n in cameras for n in pair)]
+    pairs = stereo_pairs(cameras, target_mm, listed)
     return Cloud.join(
-        [
-            match_pair(
-                frame.views[a],
-                frame.views[b],
-                target_mm,
-                settings.reach_mm,
-                block_px=settings.block_px,
-                uniqueness_percent=settings.uniqueness_percent,
-                consistency_px=settings.consistency_px,
-                speckle_px=settings.speckle_px,
-                min_texture=settings.min_texture,
-            )
-            for a, b in stereo_pairs(cameras, target_mm, listed)
-        ]
+        [match_pair(frame.views[a], frame.views[b], target_mm, settings) for a, b in pairs]
     )
+
+
+def skin_of(model: FaceModel) -> np.ndarray:
+    """Vertices (V,) bool that stereo points may pull: not the inside of the mouth, not the eyes."""
+    return ~(model.regions["mouth_inner"] | model.regions["eyes"])
 
 
 def register_neutral(
@@ -110,7 +89,15 @@ def register_neutral(
 ) -> Neutral:
     """Register the template to a frame.
 
-    Raises InputError where there are too few landmarks or points.
+    Args:
+        frame: the neutral, full size.
+        model: the template, V vertices.
+        landmarks: of the frame.
+        stereo, settings: see their classes.
+        matcher: of images.
+
+    Raises:
+        InputError: too few landmarks or points.
     """
     if landmarks.valid.sum() < 6:
         raise InputError(
@@ -119,52 +106,25 @@ def register_neutral(
             "Check the cameras' calibration, or give landmark labels of the neutral.",
             frame=frame.number,
         )
-    fitted, _, _ = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
-    plate = ThinPlate.of(fitted, model.triangles)
-    start = deform_to_landmarks(
-        fitted,
-        plate,
-        model.landmarks,
-        landmarks,
-        length_mm=settings.landmark_length_mm,
-        sigma_mm=settings.landmark_sigma_mm,
-    )
-    skin = ~(model.regions["mouth_inner"] | model.regions["eyes"])
+    start = _on_landmarks(model, landmarks, settings)
+    skin = skin_of(model)
     target = np.nanmean(landmarks.points_mm[landmarks.valid], axis=0)
     raw = stereo_cloud(frame, target, stereo)
-    cloud = fuse(
-        near_mesh(raw, Mesh(start, model.triangles), settings.first_gate_mm, skin, 0.2),
-        stereo.spacing_mm,
-    )
-    if len(cloud) < 1000:
-        raise InputError(
-            f"{len(cloud)} stereo points on the face",
-            "thousands",
-            "Check the stereo pairs and the cameras' calibration.",
-            frame=frame.number,
-        )
+    raw = near_mesh(raw, Mesh(start, model.triangles), settings.first_gate_mm, skin, 0.2)
+    cloud = _fused(raw, stereo.spacing_mm, frame.number)
     anneal = np.linspace(0, 1, settings.rounds)
-    lengths = settings.first_length_mm ** (1 - anneal) * settings.last_length_mm**anneal
-    gates = settings.first_gate_mm ** (1 - anneal) * settings.last_gate_mm**anneal
     placed = register_to_cloud(
         start,
         model.triangles,
         cloud,
         skin,
-        lengths_mm=lengths,
-        gates_mm=gates,
+        lengths_mm=settings.first_length_mm ** (1 - anneal) * settings.last_length_mm**anneal,
+        gates_mm=settings.first_gate_mm ** (1 - anneal) * settings.last_gate_mm**anneal,
         spacing_mm=stereo.spacing_mm,
     )
     cloud = near_mesh(cloud, Mesh(placed, model.triangles), settings.last_gate_mm, skin, 0.3)
     surface = screened_poisson(cloud, settings.poisson_depth, 2 * stereo.spacing_mm)
-    cameras = {name: view.camera for name, view in frame.views.items()}
-    pairs = candidate_pairs(
-        cameras,
-        target,
-        min_angle_deg=settings.polish_min_angle_deg,
-        max_angle_deg=settings.polish_max_angle_deg,
-        max_density_ratio=1.5,
-    ) or stereo_pairs(cameras, target, stereo.pairs)
+    pairs = _polish_pairs(frame, target, stereo, settings)
     polished, information = polish(
         frame,
         placed,
@@ -176,3 +136,45 @@ def register_neutral(
         max_offset_mm=settings.last_gate_mm,
     )
     return Neutral(polished, information, landmarks, cloud, surface)
+
+
+def _fused(raw: Cloud, spacing_mm: float, number: int) -> Cloud:
+    """The points fused; raises InputError where few are left."""
+    cloud = fuse(raw, spacing_mm)
+    if len(cloud) < 1000:
+        raise InputError(
+            f"{len(cloud)} stereo points on the face",
+            "thousands",
+            "Check the stereo pairs and the cameras' calibration.",
+            frame=number,
+        )
+    return cloud
+
+
+def _on_landmarks(
+    model: FaceModel, landmarks: Triangulated, settings: NeutralSettings
+) -> np.ndarray:
+    """The template (V, 3) fitted and deformed to the landmarks, world."""
+    fitted = fit_template(model, landmarks, identity_sigma_mm=settings.landmark_sigma_mm)
+    return deform_to_landmarks(
+        fitted,
+        ThinPlate.of(fitted, model.triangles),
+        model.landmarks,
+        landmarks,
+        length_mm=settings.landmark_length_mm,
+        sigma_mm=settings.landmark_sigma_mm,
+    )
+
+
+def _polish_pairs(
+    frame: Frame, target_mm: np.ndarray, stereo: StereoSettings, settings: NeutralSettings
+) -> list[tuple[str, str]]:
+    """Pairs of cameras whose images are compared on the surface round a point (3,)."""
+    cameras = {name: view.camera for name, view in frame.views.items()}
+    return candidate_pairs(
+        cameras,
+        target_mm,
+        min_angle_deg=settings.polish_min_angle_deg,
+        max_angle_deg=settings.polish_max_angle_deg,
+        max_density_ratio=1.5,
+    ) or stereo_pairs(cameras, target_mm, stereo.pairs)

@@ -27,7 +27,9 @@ def register_to_cloud(
     """Point-to-plane registration with annealed stiffness (after Amberg et al. 2007), (V, 3) mm.
 
     Args:
-        vertices_mm: (V, 3) start, near the cloud.
+        vertices_mm: (V, 3) start, near the cloud, world, mm.
+        triangles: (T, 3).
+        cloud: in the same world.
         matchable: (V,) bool; others follow the smooth prior.
         lengths_mm: stiffness of each round (see `solver`), falling.
         gates_mm: largest distance of a match of each round.

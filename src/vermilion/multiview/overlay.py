@@ -17,7 +17,7 @@ from vermilion.multiview.views import Frame, View
 
 
 def label(image: np.ndarray, text: str) -> np.ndarray:
-    """An image at the sheet's size with a line of text."""
+    """An image (h, w, 3) uint8 at the sheet's size with a line of text, (h', w', 3) uint8."""
     return write_label(_reduced(image), text)
 
 
@@ -28,7 +28,7 @@ def show(view: View) -> np.ndarray:
 
 
 def show_wires(view: View, vertices_mm: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """The image with the mesh's edges (E, 2) drawn thinly."""
+    """The image (h, w, 3) uint8 with edges (E, 2) of vertices_mm (V, 3), world, drawn thinly."""
     image = show(view)
     pixels = view.camera.project(vertices_mm)
     ends = pixels[edges]
@@ -40,7 +40,7 @@ def show_wires(view: View, vertices_mm: np.ndarray, edges: np.ndarray) -> np.nda
 
 
 def show_cloud(camera: Camera, cloud: Cloud) -> np.ndarray:
-    """The cloud from a camera, shaded by its normals."""
+    """The cloud from a camera, shaded by its normals, (h, w, 3) uint8."""
     image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
     if not len(cloud):
         return image
@@ -54,9 +54,16 @@ def show_cloud(camera: Camera, cloud: Cloud) -> np.ndarray:
 def draw_dots(
     image: np.ndarray, camera: Camera, points_mm: np.ndarray, colours: np.ndarray
 ) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with points (N, 3) as dots of 2 x 2 pixels, the nearest on top.
+    """A copy of an image with points as dots of 2 x 2 pixels, the nearest on top.
 
-    `colours` (N, 3) uint8.
+    Args:
+        image: (h, w, 3) uint8.
+        camera: of the image.
+        points_mm: (N, 3) world, mm.
+        colours: (N, 3) uint8.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     image = image.copy()
     depth = np.linalg.norm(camera.centre_mm - points_mm, axis=1)
@@ -73,7 +80,7 @@ def draw_dots(
 
 
 def pick_cameras(frame: Frame, target_mm: np.ndarray, count: int = 2) -> list[str]:
-    """The widest and the closest camera of a frame (and further ones between)."""
+    """The widest and the closest camera of a frame at target_mm (3,), and further ones between."""
     density = {
         name: view.camera.calibration[0, 0] / view.camera.to_camera(target_mm)[2]
         for name, view in frame.views.items()
@@ -99,6 +106,14 @@ def neutral_sheet(
     """Wires, mesh, cloud, Poisson surface and certainty of the neutral in two cameras.
 
     For a later take of a person also how far its own fit lay from the first take's points.
+
+    Args:
+        frame: of the neutral.
+        neutral: V vertices.
+        triangles, edges: (T, 3), (E, 2) of it.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     images = []
     error = np.where(
@@ -132,7 +147,15 @@ def neutral_sheet(
 def frames_sheet(
     shown: Sequence[tuple[Frame, RefinedFrame]], triangles: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """For some frames of a chunk: wires, mesh, cloud, residual and visibility in two cameras."""
+    """For some frames of a chunk: wires, mesh, cloud, residual and visibility in two cameras.
+
+    Args:
+        shown: the frames and what was found in them.
+        triangles, edges: (T, 3), (E, 2) of the mesh.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
     images = []
     for frame, refined in shown:
         registered = refined.registered

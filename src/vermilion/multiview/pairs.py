@@ -6,22 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import cv2
 import numpy as np
 
 from vermilion.geometry.camera import Camera, pinhole
+from vermilion.imaging.sampling import sample_bilinear
 from vermilion.storage.errors import InputError
 
 
 def convergence_deg(a: Camera, b: Camera, target_mm: np.ndarray) -> float:
-    """Angle between two cameras' rays to a point."""
+    """Angle between two cameras' rays to target_mm (3,), world."""
     towards = [target_mm - camera.centre_mm for camera in (a, b)]
     u, v = (t / np.linalg.norm(t) for t in towards)
     return float(np.degrees(np.arccos(np.clip(u @ v, -1, 1))))
 
 
 def density(camera: Camera, target_mm: np.ndarray) -> float:
-    """Pixels a millimetre at a point."""
+    """Pixels a millimetre at target_mm (3,), world."""
     return float(camera.calibration[0, 0] / camera.to_camera(target_mm)[2])
 
 
@@ -33,7 +33,7 @@ def candidate_pairs(
     max_angle_deg: float,
     max_density_ratio: float,
 ) -> list[tuple[str, str]]:
-    """All pairs that see a point from similar directions and at similar resolution."""
+    """All pairs that see target_mm (3,) from similar directions and at similar resolution."""
     pairs = []
     for a, b in combinations(sorted(cameras), 2):
         angle = convergence_deg(cameras[a], cameras[b], target_mm)
@@ -56,7 +56,15 @@ def stereo_pairs(
 ) -> list[tuple[str, str]]:
     """The rig's stereo pairs: those listed, else each camera with its nearest neighbour.
 
-    Raises InputError where a listed camera does not exist or no pair is left.
+    Args:
+        cameras: by name.
+        target_mm: (3,) what they look at, world, mm.
+        listed: pairs that are used instead.
+        min_angle_deg, max_angle_deg: between the rays of a pair.
+        max_density_ratio: of the resolutions of a pair.
+
+    Raises:
+        InputError: a listed camera does not exist, or no pair is left.
     """
     unknown = sorted({name for pair in listed for name in pair} - set(cameras))
     if unknown:
@@ -110,7 +118,7 @@ class Rectified:
         return float(np.linalg.norm(self.right.centre_mm - self.left.centre_mm))
 
     def points(self, pixels: np.ndarray, disparity_px: np.ndarray) -> np.ndarray:
-        """World points (N, 3) of left pixels (N, 2) with disparities (N,)."""
+        """World points (N, 3) mm of left pixels (N, 2) with disparity_px (N,)."""
         k, k_right = self.left.calibration, self.right.calibration
         offset = k[0, 2] - k_right[0, 2]
         depth = k[0, 0] * self.baseline_mm / (disparity_px - offset)
@@ -126,7 +134,7 @@ class Rectified:
 
 
 def rectify(a: Camera, b: Camera, target_mm: np.ndarray, reach_mm: float) -> Rectified:
-    """Rectify two pinhole cameras for a scene within `reach_mm` of a point.
+    """Rectify two pinhole cameras for a scene within `reach_mm` of target_mm (3,), world.
 
     The rows lie along the baseline, whatever its direction; which camera is left follows from it.
     """
@@ -155,8 +163,14 @@ def rectify(a: Camera, b: Camera, target_mm: np.ndarray, reach_mm: float) -> Rec
     return Rectified(left, right, int(np.floor(low - 1)), count)
 
 
-def rectified_image(original: Camera, image: np.ndarray, turned: Camera):
-    """(image in the turned camera, mask of pixels that the original has), same centre."""
+def rectified_image(
+    original: Camera, image: np.ndarray, turned: Camera
+) -> tuple[np.ndarray, np.ndarray]:
+    """The image (h, w) of a camera as one of the same centre sees it.
+
+    Returns:
+        the image (h', w') of the turned camera, and (h', w') bool of pixels that the original has.
+    """
     rows = turned.pixel_grid()
     k = turned.calibration
     local = np.stack(
@@ -172,11 +186,5 @@ def rectified_image(original: Camera, image: np.ndarray, turned: Camera):
     x = in_original[..., 0] / in_original[..., 2] * ko[0, 0] + ko[0, 2]
     y = in_original[..., 1] / in_original[..., 2] * ko[1, 1] + ko[1, 2]
     where = np.stack([x, y], axis=-1)
-    rectified = cv2.remap(
-        image,
-        (x - 0.5).astype(np.float32),
-        (y - 0.5).astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-    )
+    rectified = sample_bilinear(image, where, "zero")
     return rectified, original.in_image(where, 1.0) & (in_original[..., 2] > 0)

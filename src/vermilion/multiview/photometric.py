@@ -10,7 +10,8 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import Hits, RayCaster
-from vermilion.multiview.views import View, sample
+from vermilion.imaging.sampling import sample_bilinear
+from vermilion.multiview.views import View
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,16 @@ def sight(
     min_cosine: float = 0.15,
     tolerance_mm: float = 0.3,
 ) -> Sight:
-    """Project and test the visibility of a mesh's vertices."""
+    """Project and test the visibility of a mesh's vertices.
+
+    Args:
+        caster: of the mesh.
+        camera: in its world.
+        vertices_mm: (V, 3) world, mm.
+        normals: (V, 3) unit; None: they are found here.
+        min_cosine: of a vertex that faces the camera.
+        tolerance_mm: how far in front of a vertex the mesh may lie.
+    """
     if normals is None:
         normals = vertex_normals(vertices_mm, caster.triangles)
     towards = camera.centre_mm - vertices_mm
@@ -80,7 +90,7 @@ class Raster:
     hits: Hits
 
     def cut(self, image: np.ndarray) -> np.ndarray:
-        """The window of an image (h, w)."""
+        """The window (h', w') of an image (h, w)."""
         bottom, right = self.top_px + self.camera.height_px, self.left_px + self.camera.width_px
         return image[self.top_px : bottom, self.left_px : right]
 
@@ -163,16 +173,23 @@ class FlowMatcher:
         self.window_px = window_px
 
     def flow(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """(h, w, 2) with a(x) ~ b(x + flow(x)); images (h, w) uint8."""
+        """Flow (h, w, 2) px with a(x) ~ b(x + flow(x)), of a and b (h, w) uint8."""
         return self._flow.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), None)
 
-    def agreement(self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray):
-        """Local normalised correlation (h, w) of a(x) and b(x + flow) inside a mask."""
-        height, width = a.shape
-        x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-        there = cv2.remap(
-            b.astype(np.float32), x + flow[..., 0], y + flow[..., 1], cv2.INTER_LINEAR
-        )
+    def agreement(
+        self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray
+    ) -> np.ndarray:
+        """Local normalised correlation of a(x) and b(x + flow) inside a mask.
+
+        Args:
+            a, b: (h, w) uint8, locally normalised.
+            flow: (h, w, 2) px.
+            mask: (h, w) bool.
+
+        Returns:
+            (h, w) float32 in [-1, 1]; zero outside the mask.
+        """
+        there = _along(b.astype(np.float32), flow, cv2.BORDER_CONSTANT)
         weight = mask.astype(np.float32)
         a, b = (a.astype(np.float32) - 128) * weight, (there - 128) * weight
         mean = [self._blur(p) for p in (weight, a, b, a * a, b * b, a * b)]
@@ -183,23 +200,22 @@ class FlowMatcher:
         return np.where(mask, (ab - ma * mb) / variance, 0.0).astype(np.float32)
 
     def round_trip(self, flow: np.ndarray, back: np.ndarray) -> np.ndarray:
-        """Distance (h, w) px by which flow there and flow back (h, w, 2) miss the start.
+        """Distance (h, w) px by which flow (h, w, 2) and the flow back (h, w, 2) miss the start.
 
         What one image hides has no way back.
         """
-        height, width = flow.shape[:2]
-        x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-        returned = cv2.remap(
-            back,
-            x + flow[..., 0],
-            y + flow[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-        return np.linalg.norm(flow + returned, axis=2)
+        return np.linalg.norm(flow + _along(back, flow, cv2.BORDER_REPLICATE), axis=2)
 
     def _blur(self, image):
         return cv2.blur(image, (self.window_px, self.window_px))
+
+
+def _along(image: np.ndarray, flow: np.ndarray, border: int) -> np.ndarray:
+    """Values of an image (h, w[, c]) at each pixel + flow (h, w, 2)."""
+    height, width = flow.shape[:2]
+    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    places = np.stack([x, y], axis=-1) + flow
+    return cv2.remap(image, places, None, cv2.INTER_LINEAR, borderMode=border)
 
 
 @dataclass(frozen=True)
@@ -233,14 +249,7 @@ def compare(
     """
     where, mask = warp_to(raster, reference_sight.pixels, reference_sight.visible)
     real = raster.cut(view.normalised)
-    predicted = cv2.remap(
-        reference.normalised,
-        where[..., 0] - 0.5,
-        where[..., 1] - 0.5,
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    predicted = np.where(mask, predicted, real)
+    predicted = np.where(mask, sample_bilinear(reference.normalised, where), real)
     flow = matcher.flow(predicted, real)
     agreement = matcher.agreement(predicted, real, flow, mask)
     return Comparison(raster, predicted, real, mask, flow, agreement)
@@ -252,7 +261,7 @@ def motion_at(
     """The flow of a comparison at the vertices that both images see."""
     inside = seen.pixels - [found.raster.left_px, found.raster.top_px]
     stack = np.dstack([found.flow, found.agreement, found.mask.astype(np.float32)])
-    at = sample(stack, inside)
+    at = sample_bilinear(stack, inside)
     usable = seen.visible & reference_sight.visible & (at[:, 3] > 0.9)
     weight = np.clip((at[:, 2] - min_agreement) / (1 - min_agreement), 0, 1)
     weight = weight * np.clip(seen.cosine, 0, 1)

@@ -29,6 +29,15 @@ def normal_offsets(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distance of the real surface from each vertex along its normal, from all pairs.
 
+    Args:
+        frame: with its images.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        pairs: of cameras.
+        matcher: of images.
+        sigma_px: expected error of a measurement.
+        max_offset_mm: farther offsets do not count.
+
     Returns:
         (offset (V,) mm, information (V,) 1/mm^2, zero where no pair sees the vertex).
     """
@@ -41,38 +50,37 @@ def normal_offsets(
         name: rasterise(caster, view.camera, sights[name]) for name, view in frame.views.items()
     }
     offsets, weights = [], []
-    for a, b in pairs:
-        for source, target in ((a, b), (b, a)):
-            motion = measure_motion(
-                matcher,
-                rasters[target],
-                sights[target],
-                frame.views[target],
-                frame.views[source],
-                sights[source],
-            )
-            origin = frame.views[source].camera.centre_mm
-            ray = vertices_mm - origin
-            ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-            slope = np.einsum(
-                "vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray
-            )
-            square = np.maximum((slope * slope).sum(axis=1), 1e-9)
-            along = (slope * motion.offset_px).sum(axis=1) / square
-            across = motion.offset_px - along[:, None] * slope
-            off_line = np.linalg.norm(across, axis=1)
-            cosine = (ray * normals).sum(axis=1)
-            offset = along * cosine
-            weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
-            weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
-            weight[np.abs(offset) > max_offset_mm] = 0
-            offsets.append(offset)
-            weights.append(weight)
+    for source, target in (way for a, b in pairs for way in ((a, b), (b, a))):
+        motion = measure_motion(
+            matcher,
+            rasters[target],
+            sights[target],
+            frame.views[target],
+            frame.views[source],
+            sights[source],
+        )
+        origin = frame.views[source].camera.centre_mm
+        ray = vertices_mm - origin
+        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+        slope = np.einsum("vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray)
+        square = np.maximum((slope * slope).sum(axis=1), 1e-9)
+        along = (slope * motion.offset_px).sum(axis=1) / square
+        across = motion.offset_px - along[:, None] * slope
+        off_line = np.linalg.norm(across, axis=1)
+        cosine = (ray * normals).sum(axis=1)
+        offset = along * cosine
+        weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
+        weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
+        weight[np.abs(offset) > max_offset_mm] = 0
+        offsets.append(offset)
+        weights.append(weight)
     return robust_mean(np.array(offsets), np.array(weights))
 
 
-def robust_mean(values: np.ndarray, weights: np.ndarray, rounds: int = 5):
-    """Weighted mean over the first axis with Cauchy weights, (mean (V,), information (V,))."""
+def robust_mean(
+    values: np.ndarray, weights: np.ndarray, rounds: int = 5
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (V,) and its information (V,) of values (N, V), weights (N, V), with Cauchy weights."""
     total = weights.sum(axis=0)
     w = weights
     for _ in range(rounds):
@@ -94,6 +102,15 @@ def polish(
     max_offset_mm: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the mesh onto the photo-consistent surface, one round a stiffness.
+
+    Args:
+        frame: with its images.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        pairs: of cameras.
+        matcher: of images.
+        lengths_mm: stiffness of each round (see `solver`).
+        sigma_px, max_offset_mm: see `normal_offsets`.
 
     Returns:
         (vertices (V, 3) mm, information (V,) of the last round).

@@ -14,9 +14,15 @@ import numpy as np
 
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
-from vermilion.multiview.motion import Measurements, Reference, cloud_planes, solve_motion
+from vermilion.multiview.motion import (
+    CloudData,
+    Measurements,
+    Reference,
+    SolveSettings,
+    cloud_planes,
+    solve_motion,
+)
 from vermilion.multiview.photometric import FlowMatcher, measure_motion, rasterise, sight
-from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.views import Frame
 
 
@@ -36,57 +42,53 @@ class Registered:
     residual_px: np.ndarray
 
 
+@dataclass(frozen=True)
+class FrameMatchSettings:
+    """How a frame is matched.
+
+    Attributes:
+        sigma_px: expected error of a measurement.
+        max_step_mm: longest step of a vertex in a round.
+        min_agreement: correlation below which a measurement is not used.
+        ray_stride_px: distance of the rays that predict an image.
+    """
+
+    sigma_px: float
+    max_step_mm: float
+    min_agreement: float
+    ray_stride_px: int = 2
+
+
 def register_frame(
     levels: Sequence[tuple[Reference, Frame, float]],
     start_mm: np.ndarray,
     matcher: FlowMatcher,
-    *,
-    sigma_px: float,
-    max_step_mm: float,
-    min_agreement: float,
-    stride_px: int = 2,
-    cloud: Cloud | None = None,
-    cloud_allowed: np.ndarray | None = None,
-    cloud_gate_mm: float = 1.5,
+    settings: FrameMatchSettings,
+    cloud: CloudData | None = None,
 ) -> Registered:
     """Register a frame from a start within some pixels.
 
     Args:
         levels: the rounds: reference and frame at that round's resolution, and its stiffness in
             mm (see `solver`).
-        start_mm: (V, 3).
-        sigma_px: expected error of a measurement.
-        max_step_mm: longest step of a vertex in a round.
-        min_agreement: correlation below which a measurement is not used.
-        stride_px: distance of the rays that predict an image.
-        cloud, cloud_allowed, cloud_gate_mm: the frame's stereo points and which vertices (V,)
-            they may pull.
+        start_mm: (V, 3) world, mm.
+        matcher: of images.
+        settings: see `FrameMatchSettings`.
+        cloud: the frame's stereo points.
+
+    Returns:
+        the mesh in the world and how well it is known.
     """
     current = np.asarray(start_mm, dtype=np.float64)
+    px_per_mm = levels[-1][0].px_per_mm
     for reference, frame, length in levels:
-        measured, normals = measure_frame(
-            reference, frame, current, matcher, min_agreement, stride_px
-        )
+        measured, normals = measure_frame(reference, frame, current, matcher, settings)
         planes = None
         if cloud is not None:
-            planes = cloud_planes(
-                current,
-                normals,
-                cloud,
-                cloud_allowed,
-                sigma_mm=sigma_px / reference.px_per_mm,
-                gate_mm=cloud_gate_mm,
-            )
-        solution = solve_motion(
-            reference.plate,
-            current,
-            measured,
-            length,
-            px_per_mm=levels[-1][0].px_per_mm,
-            sigma_px=sigma_px,
-            max_step_mm=max_step_mm,
-            planes=planes,
-        )
+            sigma_mm = settings.sigma_px / reference.px_per_mm
+            planes = cloud_planes(current, normals, cloud, sigma_mm)
+        solve = SolveSettings(length, px_per_mm, settings.sigma_px, settings.max_step_mm)
+        solution = solve_motion(reference.plate, current, measured, solve, planes)
         current = current + solution.step_mm
     total = solution.weights.sum(axis=0)
     square = (solution.weights * solution.left_px**2).sum(axis=0)
@@ -100,10 +102,20 @@ def measure_frame(
     frame: Frame,
     vertices_mm: np.ndarray,
     matcher: FlowMatcher,
-    min_agreement: float,
-    stride_px: int,
+    settings: FrameMatchSettings,
 ) -> tuple[Measurements, np.ndarray]:
-    """What all cameras of a frame, that the reference has too, say of a mesh; and its normals."""
+    """What all cameras of a frame, that the reference has too, say of a mesh.
+
+    Args:
+        reference: with its images.
+        frame: with its images.
+        vertices_mm: (V, 3) the frame's mesh as it is thought to be, world, mm.
+        matcher: of images.
+        settings: see `FrameMatchSettings`.
+
+    Returns:
+        the measurements, and the mesh's normals (V, 3).
+    """
     caster = RayCaster(vertices_mm, reference.triangles)
     normals = vertex_normals(vertices_mm, reference.triangles)
     jacobians, motions = [], []
@@ -114,12 +126,12 @@ def measure_frame(
         motions.append(
             measure_motion(
                 matcher,
-                rasterise(caster, view.camera, seen, stride_px),
+                rasterise(caster, view.camera, seen, settings.ray_stride_px),
                 seen,
                 view,
                 reference.frame.views[name],
                 reference.sights[name],
-                min_agreement=min_agreement,
+                min_agreement=settings.min_agreement,
             )
         )
         jacobians.append(view.camera.pixel_jacobian(vertices_mm))

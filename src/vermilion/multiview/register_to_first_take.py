@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vermilion.geometry.mesh import rigid_alignment
-from vermilion.multiview.neutral import Neutral
-from vermilion.multiview.take import Refiner, skin_of
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.multiview.neutral import Neutral, skin_of
+from vermilion.multiview.take import Refiner
 from vermilion.multiview.views import Frame
 
 
@@ -30,8 +30,8 @@ def with_points_of(first: Refiner, take: str, frame: Frame, own: Neutral) -> tup
         (the neutral, why the own fit was kept or an empty text).
     """
     skin = skin_of(first.model).astype(np.float64)
-    rotation, translation = rigid_alignment(first.neutral_mm, own.vertices_mm, skin)
-    start = first.neutral_mm @ rotation.T + translation
+    placed = similarity_alignment(first.neutral_mm, own.vertices_mm, skin, scale=1.0)
+    start = placed.apply(first.neutral_mm)
     found = first.register(frame, start, from_afar=True)
     if not found.quality.valid:
         return own, found.quality.reason

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.rotations import nearest_rotation
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 
@@ -40,6 +41,7 @@ class ThinPlate:
 
     @classmethod
     def of(cls, vertices_mm: np.ndarray, triangles: np.ndarray) -> ThinPlate:
+        """Of a mesh at rest, vertices_mm (V, 3) and triangles (T, 3)."""
         laplacian, mass = cotangent_laplacian(vertices_mm, triangles)
         areas = mass.diagonal()
         areas = np.maximum(areas, 0.05 * np.median(areas))
@@ -48,7 +50,7 @@ class ThinPlate:
         return cls(np.asarray(vertices_mm), near, laplacian.tocsr(), bending.tocsr(), areas)
 
     def rotations(self, vertices_mm: np.ndarray, smoothing: int = 3) -> np.ndarray:
-        """Rotation of each neighbourhood from rest, (V, 3, 3), averaged over some rings."""
+        """Rotations (V, 3, 3) of neighbourhoods from rest to vertices_mm (V, 3), mean of some rings."""
         rows, columns = self.adjacency.nonzero()
         before = self.rest_mm[columns] - self.rest_mm[rows]
         after = vertices_mm[columns] - vertices_mm[rows]
@@ -58,12 +60,10 @@ class ThinPlate:
         mix = self.adjacency + sparse.eye(n)
         for _ in range(smoothing):
             sums = mix @ sums
-        u, _, vt = np.linalg.svd(sums.reshape(n, 3, 3))
-        u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-        return u @ vt
+        return nearest_rotation(sums.reshape(n, 3, 3))
 
     def missing(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """Laplacian (V, 3) that the rest shape, turned locally, has and `vertices_mm` lacks."""
+        """Laplacian (V, 3) that the rest shape, turned locally, has and vertices_mm (V, 3) lack."""
         wanted = np.einsum("vij,vj->vi", self.rotations(vertices_mm), self.laplacian @ self.rest_mm)
         return wanted - self.laplacian @ vertices_mm
 
@@ -145,5 +145,16 @@ def solve_displacement(
     length_mm: float,
     wanted_laplacian: np.ndarray | None = None,
 ) -> np.ndarray:
-    """One call of `DisplacementSolver`, (V, 3) mm."""
+    """One call of `DisplacementSolver`.
+
+    Args:
+        plate: the prior, V vertices.
+        blocks: (V, 3, 3), dimensionless.
+        right: (V, 3) mm.
+        length_mm: stiffness.
+        wanted_laplacian: (V, 3), see `DisplacementSolver.solve`.
+
+    Returns:
+        (V, 3) displacements, mm.
+    """
     return DisplacementSolver(plate, blocks, length_mm).solve(blocks, right, wanted_laplacian)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -30,6 +31,7 @@ class Cloud:
         return len(self.points_mm)
 
     def select(self, keep: np.ndarray) -> Cloud:
+        """The points of keep: (N,) bool, or ids (n,)."""
         return Cloud(self.points_mm[keep], self.normals[keep], self.sigma_mm[keep])
 
     @classmethod
@@ -43,34 +45,37 @@ class Cloud:
         )
 
 
-def match_pair(
-    a: View,
-    b: View,
-    target_mm: np.ndarray,
-    reach_mm: float,
-    *,
-    block_px: int,
-    uniqueness_percent: int,
-    consistency_px: float,
-    speckle_px: int,
-    min_texture: float,
-    masks: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
-) -> Cloud:
+@dataclass(frozen=True)
+class StereoSettings:
+    """Dense matching; see `vermilion.config.multiview` for meanings and units."""
+
+    pairs: Sequence[tuple[str, str]]
+    reach_mm: float
+    block_px: int
+    uniqueness_percent: int
+    consistency_px: float
+    speckle_px: int
+    min_texture: float
+    spacing_mm: float
+
+
+def match_pair(a: View, b: View, target_mm: np.ndarray, settings: StereoSettings) -> Cloud:
     """Match two views by semi-global matching (Hirschmueller 2008) and triangulate.
 
     Args:
-        target_mm, reach_mm: the scene lies within `reach_mm` of the point.
-        consistency_px: largest left-right disagreement of a disparity.
-        speckle_px: connected regions of fewer pixels are dropped.
-        min_texture: smallest local deviation of the normalised image (of 255).
-        masks: pixels (h, w) bool of the two views that may be matched; None for all.
+        a, b: views of pinhole cameras.
+        target_mm: (3,) world; the scene lies within the settings' reach of it.
+        settings: of the matching.
+
+    Returns:
+        points in the world, mm.
     """
-    pair = rectify(a.camera, b.camera, target_mm, reach_mm)
-    left, left_inside = _turned(a, pair.left, masks[0])
-    right, right_inside = _turned(b, pair.right, masks[1])
-    disparity = _disparity(left, right, pair, block_px, uniqueness_percent)
+    pair = rectify(a.camera, b.camera, target_mm, settings.reach_mm)
+    left, left_inside = rectified_image(a.camera, a.normalised, pair.left)
+    right, right_inside = rectified_image(b.camera, b.normalised, pair.right)
+    disparity = _disparity(left, right, pair, settings)
     # the same matcher, right to left, on mirrored images
-    mirrored = _disparity(right[:, ::-1], left[:, ::-1], pair, block_px, uniqueness_percent)
+    mirrored = _disparity(right[:, ::-1], left[:, ::-1], pair, settings)
     back = mirrored[:, ::-1]
     height, width = disparity.shape
     columns = np.arange(width)[None, :]
@@ -78,29 +83,21 @@ def match_pair(
     inside = (there >= 0) & (there < width)
     there = np.clip(there, 0, width - 1)
     rows = np.arange(height)[:, None]
-    agrees = np.abs(back[rows, there] - disparity) <= consistency_px
+    agrees = np.abs(back[rows, there] - disparity) <= settings.consistency_px
     good = agrees & inside & left_inside & right_inside[rows, there]
-    good &= _texture(left, block_px) >= min_texture
+    good &= _texture(left, settings.block_px) >= settings.min_texture
     kept = np.where(good, disparity, np.float32(pair.min_disparity_px - 1))
     fixed = np.ascontiguousarray(np.rint(kept * 16).astype(np.int16))
     hole = int((pair.min_disparity_px - 1) * 16)
-    cv2.filterSpeckles(fixed, hole, speckle_px, 16)
+    cv2.filterSpeckles(fixed, hole, settings.speckle_px, 16)
     good = fixed != hole
     smooth = _smoothed(disparity, good)
     return _to_cloud(pair, smooth, good)
 
 
-def _turned(view: View, camera, mask):
-    image, inside = rectified_image(view.camera, view.normalised, camera)
-    if mask is not None:
-        allowed, _ = rectified_image(view.camera, mask.astype(np.uint8) * 255, camera)
-        inside = inside & (allowed > 127)
-    return image, inside
-
-
-def _disparity(left, right, pair: Rectified, block_px: int, uniqueness_percent: int):
+def _disparity(left, right, pair: Rectified, settings: StereoSettings):
     """x_left - x_right (h, w) float32, NaN where unmatched. Images are padded by the range."""
-    pad = pair.n_disparities
+    pad, block_px = pair.n_disparities, settings.block_px
     border = [
         cv2.copyMakeBorder(np.ascontiguousarray(p), 0, 0, pad, pad, cv2.BORDER_CONSTANT)
         for p in (left, right)
@@ -113,7 +110,7 @@ def _disparity(left, right, pair: Rectified, block_px: int, uniqueness_percent: 
         P2=32 * block_px**2,
         disp12MaxDiff=-1,
         preFilterCap=63,
-        uniquenessRatio=uniqueness_percent,
+        uniquenessRatio=settings.uniqueness_percent,
         mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
     )
     fixed = matcher.compute(*border)[:, pad : pad + left.shape[1]]

@@ -14,12 +14,12 @@ from vermilion.geometry.mesh import Mesh, vertex_normals
 from vermilion.imaging.frames import FrameSource
 from vermilion.multiview.cloud import near_mesh
 from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
-from vermilion.multiview.motion import Reference, cloud_planes
-from vermilion.multiview.neutral import StereoSettings, stereo_cloud
+from vermilion.multiview.motion import CloudData, Reference, cloud_planes
+from vermilion.multiview.neutral import skin_of, stereo_cloud
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.refine import Registered, register_frame
+from vermilion.multiview.refine import FrameMatchSettings, Registered, register_frame
 from vermilion.multiview.solver import ThinPlate
-from vermilion.multiview.stereo import Cloud
+from vermilion.multiview.stereo import Cloud, StereoSettings
 from vermilion.multiview.views import Frame, load_frame, shrunk
 from vermilion.storage.errors import InputError
 from vermilion.storage.quality import QualityRow
@@ -84,7 +84,15 @@ def open_coarse(
     triangles: np.ndarray,
     scale: float,
 ) -> tuple[Reference, Callable[[int], Frame]]:
-    """A frame whose mesh (V, 3) is known, at a smaller size, and a reader of frames of that size."""
+    """A frame whose mesh is known, at a smaller size, and a reader of frames of that size.
+
+    Args:
+        images: of the take.
+        number: of the frame.
+        vertices_mm: (V, 3) its mesh, world, mm.
+        triangles: (T, 3).
+        scale: of the images.
+    """
 
     @lru_cache(maxsize=KEPT_FRAMES)
     def load(number: int) -> Frame:
@@ -110,11 +118,6 @@ class RefinedFrame:
     quality: QualityRow
 
 
-def skin_of(model: FaceModel) -> np.ndarray:
-    """Vertices (V,) that stereo points may pull: not the inside of the mouth, not the eyes."""
-    return ~(model.regions["mouth_inner"] | model.regions["eyes"])
-
-
 def frame_cloud(
     images: MultiviewImages,
     frame: Frame,
@@ -123,7 +126,7 @@ def frame_cloud(
     stereo: StereoSettings,
     settings: RefineSettings,
 ) -> Cloud:
-    """Stereo points of a frame near a mesh; none if switched off or no pair is left."""
+    """Stereo points of a frame near vertices_mm (V, 3), world; none if off or without a pair."""
     scale = settings.cloud_scale
     if not scale:
         return Cloud.join([])
@@ -149,6 +152,16 @@ class Refiner:
         settings: RefineSettings,
         matcher: FlowMatcher,
     ):
+        """Read the neutral's frame.
+
+        Args:
+            images: of the take.
+            model: the template, V vertices.
+            neutral_frame: its number.
+            neutral_mm: (V, 3) its mesh, world, mm.
+            stereo, settings: see their classes.
+            matcher: of images.
+        """
         self.images, self.model, self.settings, self.matcher = images, model, settings, matcher
         self.neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         frame = images.load(neutral_frame)
@@ -172,7 +185,7 @@ class Refiner:
         return np.sum([sight.visible for sight in sights], axis=0) >= 2
 
     def refine(self, number: int, start_mm: np.ndarray) -> RefinedFrame:
-        """Register a frame from its coarse position (V, 3); a failure is flagged, not raised.
+        """Register a frame from start_mm (V, 3), world; a failure is flagged, not raised.
 
         The neutral's frame is the neutral.
         """
@@ -206,18 +219,11 @@ class Refiner:
             (self.references[scale], self.images.at(frame, scale), length)
             for scale, length in rounds
         ]
-        registered = register_frame(
-            levels,
-            start_mm,
-            self.matcher,
-            sigma_px=self.settings.sigma_px,
-            max_step_mm=self.settings.max_step_mm,
-            min_agreement=self.settings.min_agreement,
-            stride_px=self.settings.ray_stride_px,
-            cloud=cloud,
-            cloud_allowed=skin_of(self.model),
-            cloud_gate_mm=self.settings.cloud_gate_mm,
+        settings = self.settings
+        match = FrameMatchSettings(
+            settings.sigma_px, settings.max_step_mm, settings.min_agreement, settings.ray_stride_px
         )
+        registered = register_frame(levels, start_mm, self.matcher, match, self._data(cloud))
         if not np.isfinite(registered.vertices_mm).all():
             return self._failed(number, start_mm, "the solve gave no finite positions")
         mobility = np.where(registered.cameras_seeing >= 2, 0.2, 1.0)
@@ -237,6 +243,9 @@ class Refiner:
 
     def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:
         return frame_cloud(self.images, frame, vertices_mm, self.model, self.stereo, self.settings)
+
+    def _data(self, cloud: Cloud) -> CloudData:
+        return CloudData(cloud, skin_of(self.model), self.settings.cloud_gate_mm)
 
     def _quality(self, number, frame, registered, contact, cloud) -> QualityRow:
         measured = self.seen_at_neutral & np.isfinite(registered.residual_px)
@@ -264,14 +273,7 @@ class Refiner:
 
     def _cloud_distance(self, registered: Registered, cloud: Cloud) -> float:
         normals = vertex_normals(registered.vertices_mm, self.model.triangles)
-        planes = cloud_planes(
-            registered.vertices_mm,
-            normals,
-            cloud,
-            skin_of(self.model),
-            sigma_mm=1.0,
-            gate_mm=self.settings.cloud_gate_mm,
-        )
+        planes = cloud_planes(registered.vertices_mm, normals, self._data(cloud), sigma_mm=1.0)
         near = planes.weights > 0
         return float(np.median(np.abs(planes.heights_mm[near]))) if near.any() else np.nan
 

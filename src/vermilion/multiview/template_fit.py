@@ -2,46 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import similarity_alignment
 from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.triangulate import Triangulated
 
 
-@dataclass(frozen=True)
-class Similarity:
-    """world = scale * rotation @ head + translation."""
-
-    scale: float
-    rotation: np.ndarray
-    translation_mm: np.ndarray
-
-    def apply(self, points_mm: np.ndarray) -> np.ndarray:
-        return self.scale * points_mm @ self.rotation.T + self.translation_mm
-
-    def turn(self, vectors_mm: np.ndarray) -> np.ndarray:
-        """Displacements (..., 3) of the head in the world."""
-        return self.scale * vectors_mm @ self.rotation.T
-
-
-def fit_similarity(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> Similarity:
-    """Weighted least squares of (N, 3) onto (N, 3), Umeyama 1991."""
-    weights = weights / weights.sum()
-    source_mean, target_mean = weights @ source, weights @ target
-    a, b = source - source_mean, target - target_mean
-    u, s, vt = np.linalg.svd((b * weights[:, None]).T @ a)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = (u * sign) @ vt
-    scale = float((s * sign).sum() / (weights @ (a * a).sum(axis=1)))
-    return Similarity(scale, rotation, target_mean - scale * rotation @ source_mean)
-
-
 def fit_template(
     model: FaceModel, landmarks: Triangulated, *, identity_sigma_mm: float, iterations: int = 10
-) -> tuple[np.ndarray, Similarity, np.ndarray]:
+) -> np.ndarray:
     """Similarity and identity in turn, robustly weighted.
 
     Args:
@@ -50,7 +21,7 @@ def fit_template(
         identity_sigma_mm: expected error of a landmark; identities have unit deviation.
 
     Returns:
-        (vertices (V, 3) in world mm, similarity, identity (I,)).
+        (V, 3) vertices in the world, mm.
     """
     use = landmarks.valid
     target, ids = landmarks.points_mm[use], model.landmarks[use]
@@ -60,7 +31,7 @@ def fit_template(
     weights = confidence
     for _ in range(iterations):
         source = model.neutral_mm[ids] + np.tensordot(identity, modes, axes=1)
-        similarity = fit_similarity(source, target, weights)
+        similarity = similarity_alignment(source, target, weights)
         if model.n_identities:
             rows = similarity.turn(modes).reshape(len(modes), -1).T
             left = (target - similarity.apply(model.neutral_mm[ids])).reshape(-1)
@@ -70,7 +41,7 @@ def fit_template(
         fitted = similarity.apply(model.neutral_mm[ids] + np.tensordot(identity, modes, axes=1))
         distance = np.linalg.norm(fitted - target, axis=1)
         weights = confidence / np.maximum(distance / (2 * identity_sigma_mm), 1.0)
-    return similarity.apply(model.neutral_of(identity)), similarity, identity
+    return similarity.apply(model.neutral_of(identity))
 
 
 def deform_to_landmarks(
@@ -85,6 +56,14 @@ def deform_to_landmarks(
     """Laplacian deformation of the fitted template onto the landmarks, (V, 3) mm.
 
     A landmark weighs as an area of `length_mm` squared, less where it lies over `sigma_mm` away.
+
+    Args:
+        vertices_mm: (V, 3) the fitted template, world, mm.
+        plate: of it.
+        vertex_ids: (66,) vertices of the landmarks.
+        landmarks: those not valid are left out.
+        length_mm: stiffness (see `solver`).
+        sigma_mm: expected error of a landmark.
     """
     use = landmarks.valid
     ids, target = vertex_ids[use], landmarks.points_mm[use]

@@ -11,10 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
-from vermilion.multiview.motion import Measurements, Reference, see_all, solve_motion
+from vermilion.multiview.motion import (
+    Measurements,
+    Reference,
+    SolveSettings,
+    see_all,
+    solve_motion,
+)
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.views import Frame, sample
+from vermilion.multiview.views import Frame
 from vermilion.storage.errors import InputError
 
 
@@ -78,11 +85,15 @@ def track_clip(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> Clip:
-    """Track a clip whose first frame is known (V, 3).
+    """Track a clip whose first frame is known.
 
     Args:
+        reference: the neutral.
         frames: of the clip, and the anchor that ends it where `last_mm` is its position.
         load: reads a frame at the reference's resolution; raises InputError if it cannot.
+        first_mm, last_mm: (V, 3) of the first frame and of the anchor, world, mm; None: no anchor.
+        matcher: of images.
+        settings: see `TrackSettings`.
     """
     forward, reasons = _sweep(reference, frames, load, first_mm, matcher, settings)
     if last_mm is None:
@@ -121,9 +132,19 @@ def follow(
     matcher: FlowMatcher,
     settings: TrackSettings,
 ) -> np.ndarray:
-    """Carry a mesh from one frame to the next by the flow between their images, (V, 3) mm.
+    """Carry a mesh from one frame to the next by the flow between their images.
 
     Flow that does not lead back to where it began, and flow between unlike places, weighs less.
+
+    Args:
+        reference: the neutral.
+        before, after: the two frames.
+        vertices_mm: (V, 3) of the frame before, world, mm.
+        matcher: of images.
+        settings: see `TrackSettings`.
+
+    Returns:
+        (V, 3) of the frame after, world, mm.
     """
     sights = see_all(before, vertices_mm, reference.triangles)
     jacobians, offsets, weights = [], [], []
@@ -135,7 +156,7 @@ def follow(
         whole = np.ones(flow.shape[:2], dtype=bool)
         agreement = matcher.agreement(view.normalised, there.normalised, flow, whole)
         missed = matcher.round_trip(flow, matcher.flow(there.normalised, view.normalised))
-        at = sample(np.dstack([flow, agreement, missed]), seen.pixels)
+        at = sample_bilinear(np.dstack([flow, agreement, missed]), seen.pixels)
         weight = np.clip((at[:, 2] - settings.min_agreement) / (1 - settings.min_agreement), 0, 1)
         weight = weight / (1 + (at[:, 3] / (2 * settings.sigma_px)) ** 2)
         weights.append(np.where(seen.visible, weight * np.clip(seen.cosine, 0, 1), 0.0))
@@ -144,16 +165,13 @@ def follow(
     if not jacobians:  # no camera has both frames
         return vertices_mm
     measured = Measurements(np.array(jacobians), np.array(offsets), np.array(weights))
-    solution = solve_motion(
-        reference.plate,
-        vertices_mm,
-        measured,
+    solve = SolveSettings(
         settings.length_mm,
-        px_per_mm=reference.px_per_mm,
-        sigma_px=settings.sigma_px,
-        max_step_mm=settings.max_step_mm,
+        reference.px_per_mm,
+        settings.sigma_px,
+        settings.max_step_mm,
         keep_shape=False,  # or the pull of every step would add up
         rounds=2,
         tolerance=1e-3,
     )
-    return vertices_mm + solution.step_mm
+    return vertices_mm + solve_motion(reference.plate, vertices_mm, measured, solve).step_mm

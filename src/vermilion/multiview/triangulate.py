@@ -10,9 +10,6 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera
 
-#: The jaw's silhouette slides over the skin from view to view: never triangulated.
-SLIDING = np.arange(17)
-
 
 @dataclass(frozen=True)
 class Triangulated:
@@ -88,7 +85,16 @@ def _consensus(origins, directions, confidence, limit_mm):
 def nearest_point(
     origins_mm: np.ndarray, directions: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """Point (3,) nearest to the rays (C, 3), (C, 3) in weighted least squares."""
+    """Point nearest to rays in weighted least squares.
+
+    Args:
+        origins_mm: (C, 3) world, mm.
+        directions: (C, 3) unit.
+        weights: (C,).
+
+    Returns:
+        (3,) world, mm.
+    """
     project = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     project = project * weights[:, None, None]
     right = np.einsum("cij,cj->i", project, origins_mm)
@@ -98,7 +104,16 @@ def nearest_point(
 def ray_distance(
     origins_mm: np.ndarray, directions: np.ndarray, point_mm: np.ndarray
 ) -> np.ndarray:
-    """Distance (C,) of a point to each ray."""
+    """Distance of a point to each ray.
+
+    Args:
+        origins_mm: (C, 3) world, mm.
+        directions: (C, 3) unit.
+        point_mm: (3,) world, mm.
+
+    Returns:
+        (C,) mm.
+    """
     towards = point_mm - origins_mm
     along = (towards * directions).sum(axis=-1, keepdims=True) * directions
     return np.linalg.norm(towards - along, axis=-1)

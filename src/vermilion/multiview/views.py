@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.imaging.frames import FrameSource
 from vermilion.imaging.images import linear_to_srgb
+from vermilion.imaging.undistortion import undistorted
 from vermilion.storage.errors import InputError
 
 LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
@@ -60,9 +61,7 @@ def make_view(
         floor: deviation (of luma in [0, 1]) that is added so that flat areas stay flat.
         scale: size of the view against the image; `window_px` is of the view.
     """
-    grey = linear_to_srgb(linear_rgb @ LUMA)
-    if not camera.is_pinhole:
-        camera, grey = undistorted(camera, grey)
+    grey, camera = undistorted(linear_to_srgb(linear_rgb @ LUMA), camera)
     view = View(camera, grey, normalise(grey, window_px, floor) if scale == 1.0 else grey)
     return view if scale == 1.0 else _shrunk(view, scale, window_px, floor)
 
@@ -81,7 +80,7 @@ def _shrunk(view: View, scale: float, window_px: float, floor: float) -> View:
 
 
 def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
-    """Local contrast normalisation of (h, w) in [0, 1] to uint8 round 128.
+    """Local contrast normalisation of grey (h, w) in [0, 1] to (h, w) uint8 round 128.
 
     Two box filters have the spread of a Gaussian of `window_px`, at a cost that does not grow.
     """
@@ -91,19 +90,6 @@ def normalise(grey: np.ndarray, window_px: float, floor: float) -> np.ndarray:
     )
     deviation = np.sqrt(np.maximum(square - mean * mean, 0)) + floor
     return np.clip(128 + DEVIATION * (grey - mean) / deviation, 0, 255).astype(np.uint8)
-
-
-def undistorted(camera: Camera, image: np.ndarray) -> tuple[Camera, np.ndarray]:
-    """The pinhole camera with the same matrix and size, and its image (borders repeated)."""
-    k = camera.calibration
-    params = (k[0, 0], k[1, 1], k[0, 2], k[1, 2])
-    straight = replace(camera, model="PINHOLE", params=tuple(float(p) for p in params))
-    origins, directions = straight.rays(straight.pixel_grid())
-    where = (camera.project(origins + 1000.0 * directions) - 0.5).astype(np.float32)
-    straightened = cv2.remap(
-        image, where[..., 0], where[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
-    return straight, straightened
 
 
 def load_frame(
@@ -143,20 +129,3 @@ def load_frame(
             frame=number,
         )
     return Frame(number, views, missing)
-
-
-def sample(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Bilinear values of (h, w) or (h, w, c) float32 at pixels (N, 2); borders repeated."""
-    where = np.nan_to_num(pixels - 0.5).astype(np.float32).reshape(1, -1, 2)
-    # cv2.remap takes maps of at most 32,767 columns
-    parts = [
-        cv2.remap(
-            image,
-            part[..., 0],
-            part[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )[0]
-        for part in np.array_split(where, -(-max(where.shape[1], 1) // 30000), axis=1)
-    ]
-    return np.concatenate(parts)

@@ -17,8 +17,8 @@ from vermilion.multiview.drift import (
     drift_rows,
     neighbours,
 )
-from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, RefineSettings, frame_cloud
 from vermilion.multiview.views import Frame
 from vermilion.report.multiview_page import Sheet

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.landmarks.scheme import BROWS, EYE_LEFT, EYE_RIGHT, JAW
 from vermilion.scan.landmarks import ScanLandmarks
 
@@ -23,24 +24,18 @@ class ScanFit:
     """The head frame of a scan, and the model that looks like it.
 
     Attributes:
-        scale, rotation, translation_mm: head point = scale * scan point @ rotation.T + translation.
+        head_from_scan: from the scan's unit and frame to the head frame in mm.
         identity: (I,) in standard deviations.
         weights: (K,) expression weights of the face in the scan (eyes closed, lips closed).
         points_mm: (66, 3) the landmarks in the head frame, NaN where unknown.
         sigma_mm: (66,) their deviations.
     """
 
-    scale: float
-    rotation: np.ndarray
-    translation_mm: np.ndarray
+    head_from_scan: Similarity
     identity: np.ndarray
     weights: np.ndarray
     points_mm: np.ndarray
     sigma_mm: np.ndarray
-
-    def to_head(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the scan in the head frame, mm."""
-        return self.scale * points @ self.rotation.T + self.translation_mm
 
 
 def fit_landmarks(
@@ -81,9 +76,9 @@ def fit_landmarks(
     coefficients, robust = np.zeros(len(prior)), np.ones(len(seen))
     for _ in range(_ROUNDS):
         now = neutral + (shapes @ coefficients).reshape(-1, 3)
-        place = _similarity(seen, now, robust / sigma**2, unit_mm)
-        aligned = place[0] * seen @ place[1].T + place[2]
-        spread = place[0] * landmarks.spread[known]
+        head_from_scan = similarity_alignment(seen, now, robust / sigma**2, unit_mm)
+        aligned = head_from_scan.apply(seen)
+        spread = head_from_scan.scale * landmarks.spread[known]
         sigma = np.hypot(base[known], spread)
         away = np.linalg.norm(aligned - now, axis=1) / sigma
         robust = 1.0 / (1.0 + (away / _ROBUST_SIGMAS) ** 2)
@@ -94,18 +89,4 @@ def fit_landmarks(
     points, all_sigma = np.full((len(known), 3), np.nan), base.copy()
     points[known], all_sigma[known] = aligned, sigma
     identity, weights = np.split(coefficients, [n_identities])
-    return ScanFit(*place, identity, weights, points, all_sigma)
-
-
-def _similarity(
-    source: np.ndarray, target: np.ndarray, weights: np.ndarray, unit_mm: float | None
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Weighted similarity of (n, 3) onto (n, 3) (Umeyama 1991), of the given scale if there is one."""
-    weights = weights / weights.sum()
-    source_mean, target_mean = weights @ source, weights @ target
-    centred = source - source_mean
-    u, singular, vt = np.linalg.svd(((target - target_mean) * weights[:, None]).T @ centred)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = (u * signs) @ vt
-    scale = unit_mm or float((singular * signs).sum() / (weights @ (centred**2).sum(axis=1)))
-    return scale, rotation, target_mean - scale * rotation @ source_mean
+    return ScanFit(head_from_scan, identity, weights, points, all_sigma)

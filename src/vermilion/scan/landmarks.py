@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.geometry.mesh import Mesh
-from vermilion.geometry.registration import similarity_alignment
 from vermilion.landmarks.detector import LandmarkDetector
 from vermilion.landmarks.scheme import JAW, N_LANDMARKS
 from vermilion.scan.views import ScanViews, camera_towards
@@ -69,8 +69,9 @@ def find_landmarks(
             subject=subject,
         )
     for _ in range(2):  # the second time the views are where they should be
-        scale, rotation, _ = _head_from_scan(points, generic)
-        points, spread = _all_views(views, detector, points, scale, rotation)
+        known = INNER[np.isfinite(points[INNER]).all(axis=1)]
+        head_from_scan = similarity_alignment(points[known], generic[known])
+        points, spread = _all_views(views, detector, points, head_from_scan)
     return ScanLandmarks(points, spread)
 
 
@@ -127,21 +128,15 @@ def _first_look(views: ScanViews, detector: LandmarkDetector) -> np.ndarray | No
     return best
 
 
-def _head_from_scan(points: np.ndarray, generic: np.ndarray):
-    """Similarity that brings the scan's landmarks onto the model's: the head frame in mm."""
-    known = INNER[np.isfinite(points[INNER]).all(axis=1)]
-    return similarity_alignment(points[known], generic[known])
-
-
 def _all_views(
     views: ScanViews,
     detector: LandmarkDetector,
     points: np.ndarray,
-    scale: float,
-    rotation: np.ndarray,
+    head_from_scan: Similarity,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Median (66, 3) and spread (66,) over views round the face."""
     middle, seen = np.nanmedian(points, axis=0), []
+    scale, rotation = head_from_scan.scale, head_from_scan.rotation
     for yaw, pitch in itertools.product(np.radians(_YAWS_DEG), np.radians(_PITCHES_DEG)):
         front = [np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)]
         camera = camera_towards(

@@ -7,15 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, boundary_edges, triangle_areas, vertex_areas
-from vermilion.geometry.surface_points import closest_on_surface
+from vermilion.geometry.registration import LandmarkTargets, Schedule, register
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.scan.fit import ScanFit, fit_landmarks
 from vermilion.scan.landmarks import LEAST_GIVEN, ScanLandmarks
-from vermilion.scan.registration import WAVELENGTHS_MM, register_scan
 from vermilion.scan.transfer import DeformationTransfer
 from vermilion.storage.errors import InputError
 from vermilion.storage.quality import QualityRow
 
+#: Wavelengths under which differences are smoothed away; one dense search each.
+_WAVELENGTHS_MM = (80.0, 50.0, 30.0, 20.0, 12.0, 8.0, 5.0, 4.0, 4.0)
+#: Of the dense searches: reach of the first, the share to which it narrows, angle of the normals.
+_SEARCH_MM, _NARROWEST, _MAX_ANGLE_DEG = 20.0, 0.25, 60.0
 #: Share of the face that a scan must cover, and what a scan is warned of: distance to it, share met.
 _LEAST_COVERED, _FAR_MM, _LITTLE_MET = 0.5, 0.5, 0.8
 
@@ -47,11 +52,11 @@ class PersonalModel:
         vertices = self.registered.vertices_mm
         area = triangle_areas(vertices, triangles[skin])
         centres = vertices[triangles[skin]].mean(axis=1)
-        away = closest_on_surface(centres, self.scan)[1]
+        away = _distance_to(self.scan, centres)
         order = np.argsort(away)
         share = np.cumsum(area[order]) / area.sum()
         return {
-            "unit_mm": self.fit.scale,
+            "unit_mm": self.fit.head_from_scan.scale,
             "distance_mean_mm": float(area @ away / area.sum()),
             "distance_p95_mm": float(away[order][np.searchsorted(share, 0.95)]),
             "met_share": float(area @ self.met[triangles[skin]].all(axis=1) / area.sum()),
@@ -106,20 +111,10 @@ def personal_model(
         )
     bounds = {"jawOpen": (least_opening, 1.0)}
     fit = fit_landmarks(generic, landmarks, unit_mm, bounds, closed_eyes)
-    in_head = scan.with_vertices(fit.to_head(scan.vertices_mm))
-    posed = generic.vertices(fit.identity, fit.weights)
-    wavelengths = [w for w in WAVELENGTHS_MM if w > finest_mm] + [finest_mm] * 2
-    searching = searching_vertices(generic)
-    registered, met = register_scan(
-        Mesh(posed, generic.triangles),
-        in_head,
-        generic.landmarks,
-        fit.points_mm,
-        fit.sigma_mm,
-        searching,
-        wavelengths_mm=wavelengths,
-    )
-    area = vertex_areas(posed, generic.triangles) * searching
+    in_head = scan.with_vertices(fit.head_from_scan.apply(scan.vertices_mm))
+    registered, met = _registered(generic, fit, in_head, finest_mm)
+    area = vertex_areas(generic.vertices(fit.identity, fit.weights), generic.triangles)
+    area = area * searching_vertices(generic)
     covered = float(area @ met / area.sum())
     if covered < _LEAST_COVERED:
         raise InputError(
@@ -128,13 +123,31 @@ def personal_model(
             "Look at the overlay of the landmarks; the scan may be inside out.",
             subject=subject,
         )
-    distance = closest_on_surface(registered.vertices_mm, in_head)[1]
+    distance = _distance_to(in_head, registered.vertices_mm)
     model = transferred(generic, fit, registered.vertices_mm)
     return PersonalModel(model, fit, in_head, registered, met, distance)
 
 
+def _registered(
+    generic: FaceModel, fit: ScanFit, in_head: Mesh, finest_mm: float
+) -> tuple[Mesh, np.ndarray]:
+    """The fitted model laid over the scan, and (V,) bool of the vertices that met it."""
+    posed = Mesh(generic.vertices(fit.identity, fit.weights), generic.triangles)
+    known = np.isfinite(fit.points_mm).all(axis=1)
+    points = SurfacePoints.at_vertices(generic.landmarks[known], generic.triangles)
+    landmarks = LandmarkTargets(points, fit.points_mm[known], 1.0 / fit.sigma_mm[known] ** 2)
+    wavelengths = [w for w in _WAVELENGTHS_MM if w > finest_mm] + [finest_mm] * 2
+    schedule = Schedule(wavelengths, _SEARCH_MM, _MAX_ANGLE_DEG, _NARROWEST)
+    return register(posed, in_head, landmarks, schedule, searching=searching_vertices(generic))
+
+
+def _distance_to(scan: Mesh, points_mm: np.ndarray) -> np.ndarray:
+    """Distance (N,) mm of points (N, 3) to the surface of a scan in their frame."""
+    return Surface(scan.vertices_mm, scan.triangles).closest(points_mm).distance_mm
+
+
 def transferred(generic: FaceModel, fit: ScanFit, registered_mm: np.ndarray) -> FaceModel:
-    """The generic model's neutral and expressions carried to a registered pose (V, 3)."""
+    """The generic model's neutral and expressions carried to a pose, registered_mm (V, 3), head frame."""
     posed = generic.vertices(fit.identity, fit.weights)
     transfer = DeformationTransfer(
         posed, registered_mm, generic.triangles, generic.regions["rigid"]

@@ -38,6 +38,7 @@ class DeformationTransfer:
         triangles: np.ndarray,
         held: np.ndarray,
     ):
+        """Factor for source_mm and target_mm (V, 3), triangles (T, 3), held (V,)."""
         self.source_mm = np.asarray(source_mm, dtype=np.float64)
         self.target_mm = np.asarray(target_mm, dtype=np.float64)
         self.triangles = triangles
@@ -54,7 +55,7 @@ class DeformationTransfer:
         self._factor = CholeskyFactor(sparse.csc_matrix(stiffness + sparse.diags_array(self._hold)))
 
     def transfer(self, poses_mm: np.ndarray) -> np.ndarray:
-        """The target's poses (E, V, 3) mm of the source's poses (E, V, 3) mm."""
+        """The target's poses (E, V, 3) mm of the source's poses_mm (E, V, 3)."""
         gradients = deformation_gradients(self.source_mm, poses_mm, self.triangles)
         edges = (self._difference @ self.target_mm).reshape(-1, 3, 3)
         wanted = np.einsum("etij,tkj->tkei", gradients, edges)

@@ -46,7 +46,7 @@ class ScanViews:
         return np.where(hits.hit[..., None], shade[..., None] * _SKIN, _BACKGROUND)
 
     def on_surface(self, camera: Camera, points_px: np.ndarray) -> np.ndarray:
-        """Where pixels (n, 2) meet the scan, (n, 3); NaN where they miss it."""
+        """Where the rays of points_px (N, 2) meet the scan, (N, 3) in its unit; NaN where they miss."""
         origins, directions = camera.rays(points_px)
         distance = self._caster.cast(origins, directions).distance_mm.astype(np.float64)
         hit = np.isfinite(distance)
@@ -64,7 +64,15 @@ class ScanViews:
 def camera_towards(
     middle: np.ndarray, size: float, front: np.ndarray, up: np.ndarray, size_px: int
 ) -> Camera:
-    """A camera in front of `middle` whose image is `size` wide there; `front`, `up` are axes."""
+    """A camera in front of a point.
+
+    Args:
+        middle: (3,) what it looks at, in the scan's unit and frame.
+        size: width of the image there.
+        front: (3,) from the point to the camera.
+        up: (3,) what is up in the image.
+        size_px: of the square image.
+    """
     distance = 4.0 * size
     pose = look_at(np.asarray(middle) + distance * normalised(front), middle, up)
     return pinhole("scan", size_px * distance / size, size_px, size_px, pose)

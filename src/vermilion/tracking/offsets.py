@@ -21,12 +21,12 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.harmonics import irradiance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.rotations import rotation_matrix
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.frame_fit import View
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
-from vermilion.tracking.landmark_fit.pose import rotation_of
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class CorrectiveLayer:
     def solve(self, view: View) -> np.ndarray:
         """Offsets (V, 3) mm in the head frame, the model being at `view.start`."""
         x = view.start
-        rotation = rotation_of(x[:3]) @ view.reference
+        rotation = rotation_matrix(x[:3]) @ view.reference
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))
         face, at = self.face[rows], self.at[rows]
         base = face.points(x[N_POSE:]) @ rotation.T + x[3:6]

@@ -13,6 +13,7 @@ from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label,
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
 
@@ -57,7 +58,7 @@ def tracking_overlay(
     """
     images = []
     rows = {int(frame): row for row, frame in enumerate(landmarks.frames)}
-    for index in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)):
+    for index in evenly_spaced(len(frames), count):
         frame = int(frames[index])
         try:
             image = to_display(source.read(camera.name, frame))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vermilion.config.correspondence import CorrespondenceConfig
+from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.neutral import Neutral, correspond_neutrals, quality_of
 from vermilion.correspondence.overlay import correspondence_overlay
 from vermilion.faces.model import FaceModel
@@ -28,8 +29,11 @@ def main(snakemake):
     coarse = Mesh(read_sequence(inputs.coarse)[0].astype(np.float64), tracker.triangles)
     fit, track = TrackedTake.load(inputs.fit), LandmarkTrack.load(inputs.landmarks)
     neutral = Neutral.of(coarse, accurate, fit, track, **place)
-    settings = CorrespondenceConfig(**snakemake.params.cfg["correspondence"]).model_dump()
-    found, registered, landmarks = correspond_neutrals(neutral, tracker, template, **settings)
+    options = CorrespondenceConfig(**snakemake.params.cfg["correspondence"])
+    settings = CorrespondenceSettings(**options.model_dump(exclude={"landmarks"}))
+    found, registered, landmarks = correspond_neutrals(
+        neutral, tracker, template, options.landmarks, settings
+    )
     found.save(output.correspondence)
     frame = int(fit.frames[0])
     image = to_display(open_frames([inputs.image], subject, take).read("", frame))

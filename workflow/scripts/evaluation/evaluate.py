@@ -58,7 +58,7 @@ def reference(snakemake, tracker, correspondence, frames, place):
     if not inputs.get("truth"):
         vertices = read_frames(inputs.accurate, frames)
         neutral = read_frames(inputs.accurate, [snakemake.params.first])[0]
-        where = held_out.points_on_h(correspondence)
+        where = correspondence.vertices
         return reference_of(
             "H", where, vertices, correspondence.accurate_triangles, neutral, **place
         )

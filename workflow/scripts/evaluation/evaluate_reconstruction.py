@@ -7,15 +7,21 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.masks import mask_on, regions_of_mask
 from vermilion.evaluation.measures import measure_rows
-from vermilion.evaluation.reference import attach, drift, reference_of, transfer_lips
+from vermilion.evaluation.reference import (
+    MatchTolerance,
+    attach,
+    drift,
+    reference_of,
+    transfer_lips,
+)
 from vermilion.evaluation.take import evaluate_reconstruction
 from vermilion.evaluation.truth import read_truth
 from vermilion.evaluation.visible import cameras_that_see
-from vermilion.faces.lips import lip_labels
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.mesh import Mesh, vertex_normals
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import frames_of, read_sequence
@@ -26,13 +32,15 @@ def main(snakemake):
     inputs, cfg = snakemake.input, snakemake.params.cfg
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     options = MeasuresConfig(**cfg["evaluation.measures"])
-    near = ReferenceConfig(**cfg["evaluation.reference"])
-    cosine = np.cos(np.radians(near.max_normal_angle_deg))
+    reach = ReferenceConfig(**cfg["evaluation.reference"])
+    near = MatchTolerance(
+        reach.max_distance_mm, float(np.cos(np.radians(reach.max_normal_angle_deg)))
+    )
     template, correspondence = (
         FaceModel.load(inputs.template),
         Correspondence.load(inputs.correspondence),
     )
-    triangles, lips = template.triangles, lip_labels(template)
+    triangles = template.triangles
     frames = frames_of(inputs.accurate)
     sequence = np.asarray(read_sequence(inputs.accurate), dtype=np.float64)
     finite = np.isfinite(sequence).all(axis=(1, 2))
@@ -48,12 +56,13 @@ def main(snakemake):
         *inputs.truth, rows=frames - snakemake.params.first, **place
     )
     neutral_truth = truth[0].astype(np.float64)
-    labels = transfer_lips(
-        sequence[0], triangles, lips, neutral_truth, truth_triangles, near.max_distance_mm, cosine
+    sides = lip_sides(template)
+    truth_sides = transfer_lips(
+        Mesh(sequence[0], triangles), sides, Mesh(neutral_truth, truth_triangles), near
     )
     where = attach(
-        sequence[0], vertex_normals(sequence[0], triangles), lips,
-        Surface(neutral_truth, truth_triangles), labels, near.max_distance_mm, cosine,
+        sequence[0], vertex_normals(sequence[0], triangles), sides,
+        Surface(neutral_truth, truth_triangles), truth_sides, near,
     )  # fmt: skip
     reference = reference_of("truth", where, truth, truth_triangles, **place)
     mouth = mask_on(
@@ -61,7 +70,7 @@ def main(snakemake):
         correspondence.coarse_triangles[correspondence.mask],
     )  # fmt: skip
     regions = regions_of_mask(template, sequence[0], mouth)
-    slid = drift(sequence, triangles, reference, regions.used & reference.valid, cosine)
+    slid = drift(sequence, triangles, reference, regions.used & reference.valid, near.min_cosine)
     cameras = read_cameras(inputs.cameras).values()
     seen = cameras_that_see(reference, cameras, regions.weights["vermilion"] > 0) >= 2
     sums = evaluate_reconstruction(

@@ -11,11 +11,12 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.grain import seed_of
 from vermilion.inpaint.opening import Evidence
-from vermilion.inpaint.overlay import before_after, sample_frames, sheet
+from vermilion.inpaint.overlay import before_after, sheet
 from vermilion.inpaint.paint import Paint, paint_frame
 from vermilion.inpaint.shading import Shading
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
@@ -49,7 +50,7 @@ def main(snakemake):
     source = open_frames(snakemake.params.source, **place)
     meshes = read_sequence(snakemake.input.meshes)
     frames, rows, tiles = snakemake.params.frames, [], []
-    shown = sample_frames(frames, 8)
+    shown = [frames[i] for i in evenly_spaced(len(frames), 8)]
     with atomic_folder(snakemake.output.frames) as folder:
         for index, frame in enumerate(progress(frames, "inpaint {subject}/{take}".format(**place))):
             try:

@@ -12,10 +12,11 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.cloud import write_cloud
 from vermilion.multiview.files import read_neutral, read_views, write_neutral
-from vermilion.multiview.neutral import NeutralSettings, StereoSettings, register_neutral
+from vermilion.multiview.neutral import NeutralSettings, register_neutral
 from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.register_to_first_take import with_points_of
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.storage.logfile import log_to

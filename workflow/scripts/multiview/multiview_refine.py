@@ -10,11 +10,12 @@ from vermilion.geometry.mesh import unique_edges
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.files import read_neutral, read_track
-from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.storage.files import atomic_path
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
@@ -36,7 +37,7 @@ def main(snakemake):
     refiner = Refiner(
         images, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
     )
-    drawn = {frames[i] for i in np.linspace(0, len(frames) - 1, 3).astype(int)}
+    drawn = {frames[i] for i in evenly_spaced(len(frames), 3)}
     meshes, seeing, rows, shown = [], [], [], []
     for number, start in progress(zip(frames, coarse, strict=True), "multiview", len(frames)):
         found = refiner.refine(number, start)

@@ -16,8 +16,8 @@ from vermilion.geometry.camera import read_cameras
 from vermilion.imaging.frames import open_frames
 from vermilion.multiview.drift import DriftSettings
 from vermilion.multiview.files import read_anchors, read_neutral
-from vermilion.multiview.neutral import StereoSettings
 from vermilion.multiview.photometric import FlowMatcher
+from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, RefineSettings
 from vermilion.report.multiview_page import Findings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings

@@ -8,6 +8,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.tracking.identity.joint_identity import IdentityImageSettings, fit_joint_identity
@@ -58,9 +59,8 @@ def main(snakemake):
     fit = joint.person
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
     print(f"residual {before:.2f} to {after:.2f} display values, {len(wanted)} frames")
-    count = min(SHOWN, len(sheets))
-    shown = np.linspace(0, len(sheets) - 1, count).round().astype(int)
-    rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in np.unique(shown)]
+    shown = evenly_spaced(len(sheets), SHOWN)
+    rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in shown]
     write_srgb8(snakemake.output.overlay, tile(rows, 1))
     Identity.of(fit, tracker, samples).save(snakemake.output.identity)
 

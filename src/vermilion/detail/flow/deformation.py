@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from scipy import sparse
 
 from vermilion.detail.flow.pose import rigid_motion
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
+from vermilion.imaging.sampling import sample_bilinear
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,12 @@ def corrected_mesh(
         (V, 3) in the world; the input where no vertex is chosen.
     """
     pixels = np.nan_to_num(camera.project(vertices_mm), nan=-1e6)
-    places = (pixels - 0.5).astype(np.float32)[None]
-    known = cv2.remap(mask.astype(np.float32), places, None, cv2.INTER_LINEAR)[0] > 0.99
+    known = sample_bilinear(mask.astype(np.float32), pixels, "zero") > 0.99
     chosen = spread(pixels, np.flatnonzero(visible & known), settings.spacing_px)
     local = camera.to_camera(np.asarray(vertices_mm, dtype=np.float64))
     if not len(chosen):
         return np.array(vertices_mm, dtype=np.float64)
-    flow = cv2.remap(np.ascontiguousarray(flow_px, np.float32), places, None, cv2.INTER_LINEAR)[0]
+    flow = sample_bilinear(np.asarray(flow_px, np.float32), pixels, "zero")
     target = _normal_plane(camera, pixels[chosen] + flow[chosen])
     if settings.pose:
         firm = rigid[chosen]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.geometry.rotations import cross_matrix, rotation_matrix
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
-from vermilion.tracking.landmark_fit.pose import cross_matrix, rotation_of
 
 _LEAST_POINTS = 12
 
@@ -55,6 +55,6 @@ def rigid_motion(
         hessian[5, 5] += depth_sigma_mm**-2
         gradient[5] += translation[2] / depth_sigma_mm**2
         step = np.linalg.solve(hessian, -gradient)
-        rotation = rotation_of(step[:3]) @ rotation
+        rotation = rotation_matrix(step[:3]) @ rotation
         translation = translation + step[3:]
     return rotation, centre + translation - rotation @ centre

@@ -10,10 +10,10 @@ import numpy as np
 
 from vermilion.appearance.estimate import Sightings, estimate_appearance
 from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
-from vermilion.appearance.samples import SurfaceSamples
 from vermilion.detail.relief.short_range import DetailFilter
 from vermilion.detail.relief.sight import Sight
 from vermilion.detail.relief.topology import FineTopology
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.imaging.images import srgb_to_linear
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -85,7 +85,7 @@ def estimate_light(
         np.stack([s.trust for s in sights]),
     )
     n = len(topology.skin)
-    middle = SurfaceSamples(np.arange(n, dtype=np.int32), np.full((n, 3), 1 / 3))
+    middle = SurfacePoints(np.arange(n, dtype=np.int32), np.full((n, 3), 1 / 3))
     found = estimate_appearance(np.asarray(frames), middle, seen, _PRIOR)
     light = ClipLight(found.light, found.albedo[0], found.seen, np.zeros(n), found.frames)
     detail = DetailFilter(topology.pairs, centres_mm, found.seen, detail_mm)

@@ -12,9 +12,9 @@ from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, triangle_normals
 from vermilion.geometry.raycast import RayCaster
+from vermilion.imaging.sampling import sample_bilinear
 
 _MARGIN = 0.06
-_COLUMNS = 256
 _GRAZING = 0.25  # cosine to the view below which a triangle tells nothing
 
 
@@ -55,13 +55,7 @@ class FaceImage:
         """Display values (N, 3) at points (N, 3) in the world, and whether they are in it (N,)."""
         pixels = self.camera.project(points_mm)
         inside = self.camera.in_image(pixels, 1.0)
-        place = np.where(inside[:, None], pixels - 0.5, 0).astype(np.float32)
-        # OpenCV takes no more than 32767 rows: the points are folded into a table.
-        table = np.zeros((-(-len(place) // _COLUMNS) * _COLUMNS, 2), dtype=np.float32)
-        table[: len(place)] = place
-        table = table.reshape(-1, _COLUMNS, 2)
-        found = cv2.remap(self.values, table, None, cv2.INTER_LINEAR).reshape(-1, 3)
-        return found[: len(place)].astype(np.float64), inside
+        return sample_bilinear(self.values, pixels).astype(np.float64), inside
 
     def sight(self, fine_mm: np.ndarray, topology: FineTopology) -> Sight:
         """At the centres of the skin's triangles of a fine mesh (V', 3)."""

@@ -29,6 +29,7 @@ from vermilion.appearance.sampled_face import SampledFace
 from vermilion.appearance.samples import sample_skin
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.identity.landmark_identity import IdentityFit, IdentityProblem
 from vermilion.tracking.image_fit.frame_fit import visible_trust
@@ -36,7 +37,6 @@ from vermilion.tracking.image_fit.image_levels import Level, levels_of
 from vermilion.tracking.landmark_fit.descent import descend, pressed
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
-from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
 from vermilion.tracking.landmark_fit.shape import growth, landmark_identities, landmark_neutral
 
 
@@ -147,7 +147,7 @@ class _Round:
         self.levels: list[Level] = []
         self.trust = np.zeros((len(frames), len(samples)))
         for index, (row, image) in enumerate(zip(frames, images, strict=True)):
-            rotation = rotation_of(row[:3]) @ problem.reference
+            rotation = rotation_matrix(row[:3]) @ problem.reference
             weights = self._weights(row, shared)
             points = self.face.points(weights) @ rotation.T + row[3:6]
             normals = self.face.normals(weights) @ rotation.T
@@ -163,7 +163,7 @@ class _Round:
 
     def _look(self, index: int, frames: np.ndarray, shared: np.ndarray) -> _Look:
         row, weights = frames[index], self._weights(frames[index], shared)
-        rotation = rotation_of(row[:3]) @ self.problem.reference
+        rotation = rotation_matrix(row[:3]) @ self.problem.reference
         turned = self.face.points(weights) @ rotation.T
         points = turned + row[3:6]
         image = project(points, self.problem.focal(shared)[index])

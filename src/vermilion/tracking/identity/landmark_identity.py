@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.rotations import log_about_mean, rotation_matrix
 from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.descent import NormalEquations, descend, pressed
 from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
@@ -24,9 +25,8 @@ from vermilion.tracking.landmark_fit.observation import (
     robust_weights,
     whitening,
 )
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
-from vermilion.tracking.landmark_fit.start import first_guess, in_chart
+from vermilion.tracking.landmark_fit.start import first_guess
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class IdentityProblem:
             np.exp(self.guess)[self.take],
             self.settings.fit.weight_sigma,
         )
-        vectors, self.reference = in_chart(rotation)
+        vectors, self.reference = log_about_mean(rotation)
         self.sigma_px = self.sigma_mm * (np.exp(self.guess)[self.take] / translation[:, 2])[:, None]
         frames = np.concatenate([vectors, translation, weights], axis=1)
         shared = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
@@ -164,7 +164,7 @@ class IdentityProblem:
 
     def _camera_points(self, frames: np.ndarray, shared: np.ndarray) -> np.ndarray:
         shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
-        rotation = rotation_of(frames[:, :3]) @ self.reference
+        rotation = rotation_matrix(frames[:, :3]) @ self.reference
         points = shape.points(frames[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2)
         return points + frames[:, None, 3:6]
 
@@ -195,7 +195,7 @@ class IdentityProblem:
         root = np.sqrt(robust_weights(residual, limit))[..., None]
         white, residual = white * root[..., None], residual * root
         by_point = white @ projection_jacobian(points, focal)
-        by_head = by_point @ (rotation_of(frames[:, :3]) @ self.reference)[:, None]
+        by_head = by_point @ (rotation_matrix(frames[:, :3]) @ self.reference)[:, None]
         by_weight = np.einsum("fnij,knj->fnik", by_head, self.shape.expressions_mm)
         by_frame = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
         n = self.n_identity

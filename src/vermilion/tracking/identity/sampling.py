@@ -11,6 +11,7 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.frames import evenly_spaced
 from vermilion.tracking.identity.landmark_identity import TakeSample
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px
 
@@ -78,6 +79,5 @@ def spread_frames(valid: Mapping[str, np.ndarray], count: int) -> dict[str, np.n
     each = max(1, round(count / max(len(usable), 1)))
     chosen = {}
     for take, rows in usable.items():
-        places = np.linspace(0, len(rows) - 1, min(each, len(rows))).round().astype(int)
-        chosen[take] = rows[np.unique(places)]
+        chosen[take] = rows[evenly_spaced(len(rows), each)]
     return chosen

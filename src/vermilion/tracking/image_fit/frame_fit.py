@@ -19,13 +19,13 @@ from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.raycast import RayCaster
+from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.image_levels import Level
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
-from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class FrameProblem:
 
     def _errors(self, x, view, level, part):
         """Image less model in display values (n, 3), what they came from, and trust (n,)."""
-        rotation = rotation_of(x[:3]) @ view.reference
+        rotation = rotation_matrix(x[:3]) @ view.reference
         turned = part.face.points(x[N_POSE:]) @ rotation.T
         points = turned + x[3:6]
         normals = part.face.normals(x[N_POSE:]) @ rotation.T

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 
 from vermilion.geometry.camera import Camera
+from vermilion.imaging.sampling import sample_bilinear
+from vermilion.imaging.undistortion import undistorted
 from vermilion.tracking.landmark_fit.observation import focal_px
 
 _MARGIN_MM = 12.0
@@ -37,14 +39,13 @@ class Level:
         Returns:
             values (N, 3); derivatives (N, 3, 2) per such pixel; inside (N,) bool.
         """
-        place = (places - self.origin) / self.step - 0.5
+        pixels = (places - self.origin) / self.step
         height, width = self.colours.shape[:2]
         with np.errstate(invalid="ignore"):
-            inside = ((place >= 0) & (place <= [width - 1, height - 1])).all(axis=1)
-        place = np.where(inside[:, None], place, 0.0).astype(np.float32)
+            inside = ((pixels >= 0.5) & (pixels <= [width - 0.5, height - 0.5])).all(axis=1)
+        pixels = np.where(inside[:, None], pixels, 0.5)
         found = [
-            cv2.remap(part, place[:, None, 0], place[:, None, 1], cv2.INTER_LINEAR)[:, 0]
-            for part in (self.colours, self.slopes_x, self.slopes_y)
+            sample_bilinear(part, pixels) for part in (self.colours, self.slopes_x, self.slopes_y)
         ]
         slopes = np.stack([found[1] / self.step[0], found[2] / self.step[1]], axis=-1)
         return found[0], slopes, inside
@@ -101,20 +102,9 @@ def _ideal(image, camera, low, high):
     k = camera.calibration
     squeeze = np.array([1.0, k[1, 1] / k[0, 0]])
     centre = k[:2, 2]
-    if not camera.is_pinhole:
-        image = _undistorted(image, camera)
+    image, _ = undistorted(image, camera, "zero")
     height, width = image.shape[:2]
     first = np.clip(np.floor(low * squeeze + centre), 0, [width - 8, height - 8]).astype(int)
     last = np.clip(np.ceil(high * squeeze + centre), first + 8, [width, height]).astype(int)
     part = image[first[1] : last[1], first[0] : last[0]]
     return part, (first - centre) / squeeze, (last - first) / squeeze
-
-
-def _undistorted(image: np.ndarray, camera: Camera) -> np.ndarray:
-    """The image of the ideal pinhole camera with the same calibration matrix."""
-    k = camera.calibration
-    normal = (camera.pixel_grid() - k[:2, 2]) / [k[0, 0], k[1, 1]]
-    rays = np.concatenate([normal, np.ones((*normal.shape[:2], 1))], axis=-1)
-    world = (rays - camera.translation) @ camera.rotation
-    place = (camera.project(world) - 0.5).astype(np.float32)
-    return cv2.remap(image, place[..., 0], place[..., 1], cv2.INTER_LINEAR)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.geometry.rotations import rotation_matrix
 from vermilion.tracking.landmark_fit.expression import (
     N_POSE,
     FitSettings,
@@ -13,7 +14,6 @@ from vermilion.tracking.landmark_fit.expression import (
     landmark_equations,
 )
 from vermilion.tracking.landmark_fit.observation import Observations
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 
 
@@ -52,7 +52,7 @@ class LandmarkTerm:
 
     def cost(self, x: np.ndarray, reference: np.ndarray) -> float:
         """Of unknowns x (6 + K): rotation vector about `reference` (3, 3), translation, weights."""
-        points = self.shape.points(x[N_POSE:]) @ (rotation_of(x[:3]) @ reference).T + x[3:6]
+        points = self.shape.points(x[N_POSE:]) @ (rotation_matrix(x[:3]) @ reference).T + x[3:6]
         return landmark_cost(points[None], self.seen, self.focal_px, self.sigma_px, self.settings)
 
     def normal_equations(

@@ -9,10 +9,10 @@ import numpy as np
 
 from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.harmonics import irradiance
-from vermilion.appearance.samples import SurfaceSamples
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, vertex_normals
 from vermilion.geometry.raycast import RayCaster, interpolate
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.draw import colour_map, label, tile, to_display
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.overlay import cut_to
@@ -23,7 +23,7 @@ _WORST = 40.0  # display values at the hottest colour
 def to_vertices(
     values: np.ndarray,
     trust: np.ndarray,
-    samples: SurfaceSamples,
+    samples: SurfacePoints,
     triangles: np.ndarray,
     count: int,
 ) -> np.ndarray:

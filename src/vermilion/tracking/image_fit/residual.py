@@ -6,11 +6,11 @@ import numpy as np
 
 from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.sampled_face import SampledFace
+from vermilion.geometry.rotations import rotation_matrix
 from vermilion.imaging.display import to_display_values
 from vermilion.tracking.image_fit.frame_fit import View
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
-from vermilion.tracking.landmark_fit.pose import rotation_of
 
 
 def sample_errors(
@@ -30,7 +30,7 @@ def sample_errors(
         errors (N, 3); trust (N,), zero where not seen; place (N, 2) in pixels from the principal
         point.
     """
-    rotation = rotation_of(x[:3]) @ view.reference
+    rotation = rotation_matrix(x[:3]) @ view.reference
     points = (face.points(x[N_POSE:]) + offsets_mm) @ rotation.T + x[3:6]
     image = project(points, view.focal_px)
     found, _, inside = view.levels[0].sample(image)

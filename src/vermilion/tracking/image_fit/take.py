@@ -10,9 +10,10 @@ import numpy as np
 
 from vermilion.appearance.estimate import Appearance, Sightings, estimate_appearance
 from vermilion.appearance.sampled_face import SampledFace
-from vermilion.appearance.samples import SurfaceSamples
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.rotations import log_about_mean, rotation_matrix
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import JAW
 from vermilion.storage.errors import InputError
@@ -22,9 +23,7 @@ from vermilion.tracking.image_fit.image_levels import levels_of
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, project
-from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
-from vermilion.tracking.landmark_fit.start import in_chart
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import fit_settings
 
@@ -74,7 +73,7 @@ class TakeStart:
         camera = fit.camera
         rotation = camera.rotation @ fit.world_from_head_rotation
         # The chart is the whole take's, so that chunks can be joined.
-        vectors, reference = in_chart(rotation)
+        vectors, reference = log_about_mean(rotation)
         translation = camera.to_camera(fit.world_from_head_translation_mm)
         x = np.concatenate([vectors, translation, fit.weights], axis=1)
         rows = np.arange(len(x)) if rows is None else np.asarray(rows)
@@ -103,18 +102,18 @@ class TakeStart:
         model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
         return fit, rows, cls.of(model, identity, fit, track, settings, rows)
 
-    def face(self, samples: SurfaceSamples) -> SampledFace:
+    def face(self, samples: SurfacePoints) -> SampledFace:
         """The person at some samples."""
         return SampledFace.of(self.model, self.identity.neutral_mm, samples)
 
     def vertices(self, x: np.ndarray) -> np.ndarray:
         """Mesh (V, 3) of unknowns (6 + K,) in the camera frame."""
         local = self.model.vertices(self.identity.identity, x[N_POSE:])
-        return local @ (rotation_of(x[:3]) @ self.reference).T + x[3:6]
+        return local @ (rotation_matrix(x[:3]) @ self.reference).T + x[3:6]
 
     def with_motion(self, fit: TrackedTake, x: np.ndarray) -> TrackedTake:
         """`fit` with other poses and weights x (F, 6 + K), all frames of the take."""
-        rotation = rotation_of(x[:, :3]) @ self.reference
+        rotation = rotation_matrix(x[:, :3]) @ self.reference
         to_world = self.camera.rotation.T
         shape = self.landmark_shape()
         points = shape.points(x[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
@@ -139,7 +138,7 @@ class TakeStart:
     ) -> View:
         """What the refinement of one frame needs, from its image (h, w, 3) linear."""
         x, focal = self.x[row], focal_px(self.camera)
-        rotation = rotation_of(x[:3]) @ self.reference
+        rotation = rotation_matrix(x[:3]) @ self.reference
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
         return View(
@@ -156,7 +155,7 @@ def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sig
     """What views show at the samples, the face being at unknowns xs (6 + K each)."""
     colours, normals, trust = [], [], []
     for view, x in zip(views, xs, strict=True):
-        rotation = rotation_of(x[:3]) @ view.reference
+        rotation = rotation_matrix(x[:3]) @ view.reference
         image = project(face.points(x[N_POSE:]) @ rotation.T + x[3:6], view.focal_px)
         found = [level.sample(image) for level in view.levels]
         colours.append(np.stack([values for values, _, _ in found]))
@@ -169,7 +168,7 @@ def learn_appearance(
     frames: np.ndarray,
     views: list[View],
     face: SampledFace,
-    samples: SurfaceSamples,
+    samples: SurfacePoints,
     albedo_prior: float,
     rounds: int,
     problem_of: Callable[[Appearance], FrameProblem],

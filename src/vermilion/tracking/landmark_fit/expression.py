@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vermilion.geometry.rotations import exp_about_mean, log_about_mean
 from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.observation import (
@@ -28,7 +29,7 @@ from vermilion.tracking.landmark_fit.observation import (
     whitening,
 )
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
-from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess, in_chart, out_of_chart
+from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess
 
 N_POSE = 6
 _FRAMES_AT_ONCE = 256
@@ -154,12 +155,12 @@ class _TakeProblem:
         # Fixed from here on: deviations that grew as the head came nearer would pull it nearer.
         scale = fill_gaps(self.focal / translation[:, 2:], known, self.n_frames)
         self.sigma_px = self.sigma_mm * scale
-        vectors, self.reference = in_chart(rotation)
+        vectors, self.reference = log_about_mean(rotation)
         values = np.concatenate([vectors, translation, weights], axis=1)
         return fill_gaps(values, known, self.n_frames)
 
     def _camera_points(self, x: np.ndarray) -> np.ndarray:
-        rotation = out_of_chart(x[:, :3], self.reference)
+        rotation = exp_about_mean(x[:, :3], self.reference)
         points = self.shape.points(x[:, N_POSE:])
         return points @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
 
@@ -200,7 +201,7 @@ class _TakeProblem:
         image = project(self._camera_points(x), self.focal)
         squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, 17:]
         reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
-        rotation = out_of_chart(x[:, :3], self.reference)
+        rotation = exp_about_mean(x[:, :3], self.reference)
         return HeadMotion(rotation, x[:, 3:6].copy(), x[:, N_POSE:].copy(), reprojection)
 
 
@@ -236,7 +237,7 @@ def landmark_equations(
     points = turned + x[:, None, 3:6]
     white, residual = _whitened(points, seen, focal_px, sigma_px, settings)
     by_point = white @ projection_jacobian(points, focal_px)
-    by_head = by_point @ out_of_chart(x[:, :3], reference)[:, None]
+    by_head = by_point @ exp_about_mean(x[:, :3], reference)[:, None]
     by_weight = np.einsum("fnij,knj->fnik", by_head, shape.expressions_mm, optimize=True)
     jacobian = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
     jacobian = jacobian.reshape(len(x), -1, jacobian.shape[-1])

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import BROWS, EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, NOSE
-from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def pose_jacobian(
     Returns:
         turned (F, N, 3); derivative (F, N, 3, 3).
     """
-    rotation = rotation_of(vectors) @ reference
+    rotation = rotation_matrix(vectors) @ reference
     turned = points_mm @ np.swapaxes(rotation, 1, 2)
     return turned, -cross_matrix(turned) @ left_jacobian(vectors)[:, None]
 

@@ -1,59 +1,8 @@
-"""Rotations, and the pose of known 3D points from their images."""
+"""The pose of known 3D points from their images, in closed form."""
 
 from __future__ import annotations
 
 import numpy as np
-
-
-def cross_matrix(v: np.ndarray) -> np.ndarray:
-    """Matrices (..., 3, 3) with [v] w = v x w, of vectors (..., 3)."""
-    x, y, z = np.moveaxis(v, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def rotation_of(vectors: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) of rotation vectors (..., 3) in radians (Rodrigues)."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    k = cross_matrix(vectors)
-    small = angle < 1e-6
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 1.0 - angle**2 / 6, np.sin(safe) / safe)
-    b = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
-    return np.eye(3) + a * k + b * (k @ k)
-
-
-def vector_of(rotations: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3) of rotations (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    flat = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_rotvec()
-    return flat.reshape(*rotations.shape[:-2], 3)
-
-
-def left_jacobian(vectors: np.ndarray) -> np.ndarray:
-    """J with exp(v + dv) = exp(J dv) exp(v), (..., 3, 3)."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    k = cross_matrix(vectors)
-    small = angle < 1e-4
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
-    b = np.where(small, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
-    return np.eye(3) + a * k + b * (k @ k)
-
-
-def nearest_rotation(matrices: np.ndarray) -> np.ndarray:
-    """The rotations nearest to matrices (..., 3, 3), by singular values (Arun et al. 1987)."""
-    u, _, vt = np.linalg.svd(matrices)
-    flip = np.ones((*matrices.shape[:-2], 3))
-    flip[..., 2] = np.sign(np.linalg.det(u @ vt))
-    return (u * flip[..., None, :]) @ vt
-
-
-def mean_rotation(rotations: np.ndarray) -> np.ndarray:
-    """Chordal mean (3, 3) of rotations (F, 3, 3)."""
-    return nearest_rotation(rotations.mean(axis=0))
 
 
 def scaled_orthographic_pose(

@@ -7,12 +7,7 @@ import numpy as np
 from vermilion.landmarks.scheme import JAW
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.observation import Observations
-from vermilion.tracking.landmark_fit.pose import (
-    mean_rotation,
-    rotation_of,
-    scaled_orthographic_pose,
-    vector_of,
-)
+from vermilion.tracking.landmark_fit.pose import scaled_orthographic_pose
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 
 
@@ -65,14 +60,3 @@ def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarra
     every = np.arange(n_frames)
     columns = [np.interp(every, known, column) for column in values.T]
     return np.stack(columns, axis=1)
-
-
-def in_chart(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (M, 3, 3) as vectors (M, 3) about their mean: R = exp(v) @ mean."""
-    mean = mean_rotation(rotations)
-    return vector_of(rotations @ mean.T), mean
-
-
-def out_of_chart(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """The inverse of `in_chart`."""
-    return rotation_of(vectors) @ mean
