@@ -57,7 +57,7 @@ class NeutralPair:
         return cls(**{**arrays, **texts})
 
 
-def acquainted(
+def with_known_neutrals(
     model: LipModel,
     triangles: np.ndarray,
     of_person: NeutralPair | None,
@@ -106,9 +106,8 @@ def acquainted(
     return replace(model, estimator=estimator, neutrals_mm=neutrals, shifts=shifts)
 
 
-def neutral_pairs(inputs) -> list[NeutralPair | None]:
-    """What `acquainted` is told, from a job's inputs `neutral_pair` and `neutral_of_take`; None if absent."""
-    paths = (inputs.get(name) for name in ("neutral_pair", "neutral_of_take"))
+def load_pairs(*paths: str | Path | None) -> list[NeutralPair | None]:
+    """What `with_known_neutrals` is told: the pair of each file; None for no file."""
     return [NeutralPair.load(path) if path else None for path in paths]
 
 

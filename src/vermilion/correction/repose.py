@@ -57,7 +57,7 @@ def repose_motion(
     unit = unit_px[:, None]
     known = known * (_INDEPENDENT / np.maximum(known.sum(axis=1, keepdims=True), 1))
     for _ in range(_STEPS):
-        world = moved(points, pivot_mm, motion)
+        world = apply_motion(points, pivot_mm, motion)
         arm = world - (pivot_mm + motion[:, 3:])[:, None]
         slope = camera.pixel_jacobian(world) / unit[..., None, None]
         rows = np.concatenate([np.cross(arm[:, :, None], slope), slope], axis=3)
@@ -97,7 +97,7 @@ def smoothed_motion(
                      out=np.zeros_like(motion))  # fmt: skip
 
 
-def moved(points_mm: np.ndarray, pivot_mm: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def apply_motion(points_mm: np.ndarray, pivot_mm: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """World points (F, m, 3) after the motions (F, 6) about the pivots (F, 3)."""
     turned = (points_mm - pivot_mm[:, None]) @ np.swapaxes(rotation_matrix(motion[:, :3]), 1, 2)
     return turned + (pivot_mm + motion[:, 3:])[:, None]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from vermilion.config.regressors import is_variant
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, Corrector
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
-from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
 from vermilion.evaluation.reference import Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
@@ -43,10 +45,20 @@ class Regressed:
     seconds: float
 
     @classmethod
-    def of(cls, model: LipModel, take: CoarseTake, rows: np.ndarray) -> Regressed:
-        """Meshes of the frames `rows` of the take, whose other frames are their neighbours."""
-        corrected_mm, seconds = corrected_by(model, take)
-        return cls(model, corrected_mm[rows], seconds)
+    def of(
+        cls, model: LipModel, take: CoarseTake, settings: CorrectionSettings, rows: np.ndarray
+    ) -> Regressed:
+        """Meshes of the frames `rows` of the take, whose other frames are their neighbours.
+
+        The time is that from features to vertices. The factorisation, once a person, and what is compiled
+        at the first frame are not in it. NaN where no frame is usable.
+        """
+        corrector, usable = Corrector(model, take, settings), take.usable(take.features)
+        corrector.correct(take[np.flatnonzero(usable)[:1]])
+        start = time.perf_counter()
+        corrected_mm = corrector.correct(take)[rows]
+        seconds = time.perf_counter() - start
+        return cls(model, corrected_mm, seconds / usable.sum() if usable.any() else np.nan)
 
 
 def points_on_h(correspondence: Correspondence) -> SurfacePoints:
@@ -133,7 +145,6 @@ def shown_rows(error_mm: np.ndarray, count: int) -> np.ndarray:
 def shown_arrays(
     result: TakeResult,
     take: CoarseTake,
-    frames: np.ndarray,
     count: int,
     reference: Reference,
     neutral_mm: np.ndarray,
@@ -172,7 +183,7 @@ def shown_arrays(
         "surface_mm": moved(reference.vertices_mm[chosen][:, used], rotations, translations),
     }
     return {name: values.astype(np.float32) for name, values in arrays.items()} | {
-        "frames": frames[chosen],
+        "frames": take.frames[chosen],
         "regressors": np.array(names),
         "surface_triangles": np.searchsorted(used, reference.triangles),
         "triangles": tracker.triangles,

@@ -114,7 +114,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
             neutral = (design[first].mean(axis=0) @ self.coefficients_) @ self.basis_
             kinds = np.split(np.arange(targets.shape[1]), [n_layers or targets.shape[1]])
             self.bias_ = np.concatenate(
-                [bias_of_a_stranger(biases[:, k], neutral[k]) for k in kinds if len(k)]
+                [unseen_subject_bias(biases[:, k], neutral[k]) for k in kinds if len(k)]
             ).astype(weights.dtype)
         return self
 
@@ -218,12 +218,12 @@ def uncertain_directions(centred: np.ndarray, alpha: float) -> np.ndarray:
     return np.sqrt(alpha) * inverse
 
 
-def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
-    """Bias (K,) for a person whom the training has not seen.
+def unseen_subject_bias(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """Bias (K,) for a subject whom the training has not seen.
 
-    The layer at the neutral is identity. A stranger's is expected to be the mean of those seen,
-    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people. Of one
-    person alone nothing tells what is theirs and what everybody's: none of it is a stranger's.
+    The layer at the neutral holds the identity. That of an unseen subject is the mean of those seen,
+    shrunk towards zero by the reliability of that mean: c = 1 - var / (G mean^2) of the G people. One
+    person alone does not tell their own share from everybody's, so then the identity is zero.
 
     Args:
         biases: (G, K) of the people seen.
