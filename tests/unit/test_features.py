@@ -10,8 +10,9 @@ from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
 from vermilion.features.search import SearchSettings, find_inner, inward_normals
-from vermilion.features.shape_space import head_displacement, shape_space
-from vermilion.features.vector import FeatureTable, feature_names, judge
+from vermilion.features.shape_space import shape_space
+from vermilion.features.vector import FeatureTable, feature_names, quality_row
+from vermilion.geometry.head_frame import head_from_world
 from vermilion.geometry.mesh import vertex_areas
 from vermilion.storage.errors import InputError
 
@@ -147,7 +148,7 @@ def test_without_maps_or_without_maxima_the_models_contour_stands_in():
     assert not blank.outer_found.any()
     np.testing.assert_allclose(blank.outer_px, blank.model_outer_px, atol=0.5)
     np.testing.assert_allclose(blank.distances, nothing.distances, atol=0.02)
-    row = judge(3, blank, True, True, 0.6)
+    row = quality_row(3, blank, True, True, 0.6)
     assert not row.valid
     assert "0% of the outer contour" in row.reason
 
@@ -202,7 +203,7 @@ def test_displacement_forgets_the_pose():
     turn *= np.sign(np.linalg.det(turn))
     shift = np.array([[10.0, -4.0, 900.0]])
     world = local @ turn.T + shift
-    found = head_displacement(world, turn[None], shift, model.neutral_mm)
+    found = head_from_world(world, turn[None], shift) - model.neutral_mm
     np.testing.assert_allclose(found, local - model.neutral_mm, atol=1e-9)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.contours.curves import drawn
+from vermilion.contours.curves import inside_and_distance
 from vermilion.contours.gums import flesh_plane
 from vermilion.contours.region import SIDE
 
@@ -13,7 +13,7 @@ LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade 
 #: Just beside a border: from where to where colours count as lip's and as skin's (per inter-ocular distance).
 BESIDE = (0.01, 0.04)
 LEAST_SAMPLES = 20  # pixels that tell a colour
-LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
+LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips would make all else an outlier
 
 
 def lip_planes(
@@ -32,8 +32,8 @@ def lip_planes(
     `outer`, what lies just beside its curve, as lips pale towards their border.
     """
     size = colours.shape[1]
-    inside, to_outer = drawn(curves["outer"], size)
-    opening, to_inner = drawn(curves["inner"], size)
+    inside, to_outer = inside_and_distance(curves["outer"], size)
+    opening, to_inner = inside_and_distance(curves["inner"], size)
     ratio = to_outer / np.maximum(to_outer + to_inner, 1e-9)
     lip = inside & ~opening & (ratio > band[0]) & (ratio < band[1])
     scale = size / SIDE

@@ -23,12 +23,12 @@ from vermilion.contours.curves import (
     sampled,
     smoothed_halves,
     smoothed_ring,
-    uncrossed,
+    without_crossing,
 )
 from vermilion.contours.lip_planes import BESIDE, dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
-from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
+from vermilion.contours.ridges import SEARCHES, InnerCues, RidgeDetector, blurred_colours
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
 
@@ -90,15 +90,15 @@ class TrackRidgeDetector(RidgeDetector):
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
         normals = outward_normals(ring)
-        start = self.outer_offset * size + self.moved_parts(colours, ring)
+        start = self.outer_offset * size + self.part_offsets(colours, ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
-        fall = scaled(falls(seen[None], self.direction, self.middle)[0])
+        fall = normalised_strength(edge_strength(seen[None], self.direction, self.middle)[0])
         cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(ring, STEP_PX, self.stiffness))
         offset = smoothed_ring(start + places[chosen], 2)
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
 
-    def moved_parts(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    def part_offsets(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
         """How far (n,) px each lip and each corner as a whole lies from the take's border in a frame.
 
         Rolls and presses hide a good part of a lip, and corners come in as a mouth opens wide, which
@@ -113,9 +113,11 @@ class TrackRidgeDetector(RidgeDetector):
         result = np.zeros(len(ring))
         for part in mouth_parts(len(ring)):
             along = (offset + result)[:, None] + part[:, None] * places
-            fall = falls(unwrapped(colours, ring, along)[None], self.direction, self.middle)[0]
+            fall = edge_strength(
+                unwrapped(colours, ring, along)[None], self.direction, self.middle
+            )[0]
             near = NEARLY * size / STEP_PX
-            fall = scaled(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
+            fall = normalised_strength(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
             gain = self.edge_weight * np.average(fall, axis=0, weights=part)
             result += part * places[np.argmax(gain - (places / reach) ** 2)]
         return result
@@ -131,17 +133,17 @@ class TrackRidgeDetector(RidgeDetector):
         )
         lip, contact = filled(outer, region.size_px).astype(np.float32), dark_lines(colours[0])
         start, strength = curve, np.zeros(len(curve))
-        for once in PASSES:
+        for search in SEARCHES:
             curves = {"outer": outer, "inner": curve}
-            planes = lip_planes(colours, curves, once.band, once.tolerance)
-            curve, strength = self.moved(
-                curve if once.inner_reach < 1 else start,
+            planes = lip_planes(colours, curves, search.band, search.tolerance)
+            curve, strength = self.fit_border(
+                curve if search.inner_reach < 1 else start,
                 planes["inner"],
-                once.inner_reach * reach,
-                once.step_px,
-                Inside(colours[0], contact, planes["flesh"], lip),
+                search.inner_reach * reach,
+                search.step_px,
+                InnerCues(colours[0], contact, planes["flesh"], lip),
             )
-        return uncrossed(curve), strength
+        return without_crossing(curve), strength
 
 
 def mouth_parts(n: int) -> np.ndarray:
@@ -209,7 +211,7 @@ def learn_borders(
     offset = np.zeros(len(rings[0]))
     direction, middle = _discriminants(seen, places, offset, beside)
     for _ in range(ROUNDS):
-        fall = scaled(falls(seen, direction, middle).mean(axis=0)[:, within])
+        fall = normalised_strength(edge_strength(seen, direction, middle).mean(axis=0)[:, within])
         cost = (places[within] / (reach * size)) ** 2 - detector.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(rings[0], STEP_PX, detector.stiffness))
         offset = smoothed_ring(places[within][chosen], 2)
@@ -238,14 +240,14 @@ def unwrapped(colours: np.ndarray, ring: np.ndarray, places: np.ndarray) -> np.n
     return np.stack([sampled(plane, points) for plane in colours], axis=-1)
 
 
-def falls(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
+def edge_strength(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """How steeply the probability of lip falls outwards, (F, n, T) a pixel, of colours (F, n, T, 3)."""
     log_odds = np.einsum("fntc,nc->fnt", seen, direction) - middle[None, :, None]
     lip = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))
     return np.maximum(-np.gradient(lip, STEP_PX, axis=2), 0.0)
 
 
-def scaled(fall: np.ndarray) -> np.ndarray:
+def normalised_strength(fall: np.ndarray) -> np.ndarray:
     """Falls (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
     return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
 

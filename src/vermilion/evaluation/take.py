@@ -83,7 +83,9 @@ def evaluate_take(
         frames: (F,) frame numbers.
         regions: of the topology of the sequences; vertices without a counterpart are left out here.
         reference: of the same frames.
+        model: face model of the sequences' topology.
         clip_frames, min_clips: of `clips_of`.
+        tolerances: of lips that touch, gape or pass through each other.
         curves: true expression weights of the frames, by which the kinds of mouth shapes are known;
             without them the reference's shape decides.
     """
@@ -93,17 +95,11 @@ def evaluate_take(
         for name, s in sequences_mm.items()
     }
     neutral = np.broadcast_to(model.neutral_mm, reference.points_mm.shape)
-    head_rotations, head_translations = align_frames(reference.points_mm, neutral, regions.rest)
-    if curves is not None:
-        kinds = kinds_of_curves(curves)
-    else:
-        rest = reference.rest_mm[None]
-        rest = moved(rest, *align_frames(rest, neutral[:1], regions.rest))[0]
-        posed = moved(reference.points_mm, head_rotations, head_translations)
-        kinds = kinds_of_shapes(posed, rest, model, reference.valid)
+    head = align_frames(reference.points_mm, neutral, regions.rest)
+    kinds = _mouth_kinds(model, regions, reference, head, curves)
     clips = clips_of(frames, clip_frames, min_clips)
     sides, columns = lips_with_inside(model), columns_of(model)
-    true_gaps = gaps_in_head(reference.points_mm, head_rotations, sides, columns)
+    true_gaps = gaps_in_head(reference.points_mm, head[0], sides, columns)
     surface = surface_errors(
         aligned, reference, regions.used, lambda items: progress(items, "surface errors")
     )
@@ -111,22 +107,35 @@ def evaluate_take(
     columns = np.where(reference.valid, columns, -1)
     sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
-        gaps = gaps_in_head(sequence, head_rotations, sides, columns)
+        gaps = gaps_in_head(sequence, head[0], sides, columns)
+        through = lip_depths(sequence, model) > tolerances.through_mm
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
-            + sums_of_moving_errors(sequence, reference, head_rotations, regions, clips)
+            + sums_of_moving_errors(sequence, reference, head[0], regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)
-            + sums_of_frames(
-                "mouth.through", lip_depths(sequence, model) > tolerances.through_mm, clips
-            )
+            + sums_of_frames("mouth.through", through, clips)
         )
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
-    head = head_rotations, head_translations
     return TakeResult(sums, table, aligned, errors, head, kinds, clips)
+
+
+def _mouth_kinds(
+    model: FaceModel,
+    regions: Regions,
+    reference: Reference,
+    head: tuple[np.ndarray, np.ndarray],
+    curves: Sequence[Mapping[str, float]] | None,
+) -> np.ndarray:
+    """(F,) kind of mouth shape: by the true expression weights, or by the reference's shape."""
+    if curves is not None:
+        return kinds_of_curves(curves)
+    rest = reference.rest_mm[None]
+    rest = moved(rest, *align_frames(rest, model.neutral_mm[None], regions.rest))[0]
+    return kinds_of_shapes(moved(reference.points_mm, *head), rest, model, reference.valid)
 
 
 def evaluate_reconstruction(

@@ -95,10 +95,17 @@ def feature_names(n_shape: int, space: str = "image") -> np.ndarray:
     return np.array([*shape, *(prefix + name for name in NAMES)])
 
 
-def judge(
+def quality_row(
     frame: int, contours: FrameContours, tracked: bool, has_maps: bool, least_found: float
 ) -> QualityRow:
-    """What is to be said of a frame: valid when tracked, and enough of its outer contour found."""
+    """Quality row of a frame: valid when tracked, and enough of its outer contour found.
+
+    Args:
+        frame: its number.
+        contours: found in it.
+        tracked, has_maps: what the earlier stages say.
+        least_found: share of the outer samples.
+    """
     outer, inner = contours.outer_found.mean(), contours.inner_found.mean()
     away = np.linalg.norm(contours.outer_px - contours.model_outer_px, axis=1)
     figures = {

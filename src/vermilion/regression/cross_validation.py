@@ -65,6 +65,12 @@ class Curve:
             least = np.unravel_index(np.argmin(np.where(close, self.freedom, np.inf)), mean.shape)
         return int(least[0]), int(least[1])
 
+    def parameters(self, rule: Rule) -> dict[str, float]:
+        """`alpha`, and `beta` where the regressor has one, of the choice."""
+        row, column = self.choose(rule)
+        beta = {} if np.isnan(self.betas[row]) else {"beta": float(self.betas[row])}
+        return {"alpha": float(self.alphas[column]), **beta}
+
 
 def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
     """Clip label of each row: contiguous stretches of a sequence, (F,) int.

@@ -141,27 +141,16 @@ def train(
         data.persons if by_person else clips, **selection.grid(kind), n_folds=selection.folds,
         persons=persons,
     )  # fmt: skip
-    row, column = curve.choose(selection.choice)
-    chosen = {"alpha": float(curve.alphas[column]), "beta": float(curve.betas[row])}
-    estimator.set_params(**{k: value for k, value in chosen.items() if not np.isnan(value)})
+    estimator.set_params(**curve.parameters(selection.choice))
     places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
     targets = np.concatenate([data.layers, places], axis=1)
     estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
     model = LipModel(
-        name=name,
-        estimator=estimator,
-        feature_names=tuple(feature_names),
-        feature_columns=columns,
-        mask=mask,
-        topology=topology,
-        vertices=vertices,
-        training_frames=data.frames_of_takes(),
-        neutrals_mm=data.neutrals_mm if persons is not None else {},
-        shifts=shifts,
-        neutral_features=neutral_features,
+        name, estimator, tuple(feature_names), columns, mask, topology, data.frames_of_takes(),
+        vertices, data.neutrals_mm if persons is not None else {}, shifts, neutral_features,
         novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
-    )
+    )  # fmt: skip
     return model, curve
 
 
