@@ -150,7 +150,7 @@ class _FrameView:
     translation_mm: np.ndarray
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
-        """Head-frame points (N, 3) in pixels, (N, 2)."""
+        """`points_mm` (N, 3), head frame, in pixels (N, 2)."""
         return self.camera.project(points_mm @ self.rotation.T + self.translation_mm)
 
     def equations(self, points_mm, basis_mm, wanted_px, across) -> tuple[np.ndarray, np.ndarray]:

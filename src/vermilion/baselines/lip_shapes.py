@@ -50,7 +50,8 @@ class LipShapes:
         """Displacements (S, V, 3) mm on another identity: deformation transfer (Sumner 2004).
 
         Args:
-            neutral_mm: (V, 3) of the identity, as open as the neutrals of the training.
+            neutral_mm: (V, 3) of the identity, head frame, as open as the neutrals of the training.
+            triangles: (T, 3) of it.
             seam_mm: width of the soft ring round the mask.
         """
         rest = np.broadcast_to(neutral_mm, (len(self.layers), *neutral_mm.shape))
@@ -81,7 +82,7 @@ class PosedTake:
         accurate_neutral_mm: np.ndarray,
         correspondence: Correspondence,
     ) -> PosedTake:
-        """Of H (F, V_H, 3) and its neutral (V_H, 3) in the world; frames that are not finite go."""
+        """Of H `accurate_mm` (F, V_H, 3) and `accurate_neutral_mm` (V_H, 3), world; frames not finite go."""
         neutral = correspondence.on_coarse(np.asarray(accurate_neutral_mm, dtype=np.float64))
         meshes, _ = align_frames(
             correspondence.on_coarse(np.asarray(accurate_mm)), neutral, correspondence.rigid

@@ -40,7 +40,7 @@ class BoostedDetector(ContourDetector):
     smoothing_px: float = 1.0
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
-        """Name of the contour -> likelihood (size, size) of a cropped region (size, size, 3)."""
+        """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
         integrals = integral_images(image_channels(image))
         rows, columns = np.nonzero(region.mask)
         maps = {}

@@ -62,7 +62,7 @@ class Forest:
     reject: np.ndarray
 
     def log_odds(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Log-odds of being contour at n pixels, (n,) float32."""
+        """Log-odds (n,) float32 of contour at pixels `columns`, `rows` (n,) of `integrals` (C, H, W)."""
         flat, offsets, starts = self.pool.laid_out(integrals, columns, rows)
         return _log_odds(
             flat, offsets, self.pool.weights, starts, self.feature, self.threshold, self.leaf,
@@ -122,7 +122,7 @@ def fit_forest(
 
 
 def bin_edges(values: np.ndarray) -> np.ndarray:
-    """Upper edges of the quantile bins of each feature, (N, N_BINS - 1), from (N, n) values."""
+    """Upper edges (N, N_BINS - 1) of the quantile bins of each feature, from `values` (N, n)."""
     ordered = np.sort(values, axis=1)
     places = np.linspace(0, ordered.shape[1] - 1, N_BINS + 1)[1:-1]
     low = np.floor(places).astype(int)
@@ -136,7 +136,10 @@ def bin_features(
     columns: np.ndarray,
     rows: np.ndarray,
 ) -> np.ndarray:
-    """Bins of the features at n pixels, (N, n) uint8."""
+    """Bins (N, n) uint8 of the features at pixels `columns`, `rows` (n,) of `integrals` (C, H, W).
+
+    `edges` (N, N_BINS - 1) are those of `bin_edges`.
+    """
     flat, offsets, starts = pool.laid_out(integrals, columns, rows)
     return _bin_features(flat, offsets, pool.weights, starts, edges)
 

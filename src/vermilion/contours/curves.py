@@ -12,7 +12,7 @@ CURVE_POINTS = 240
 
 
 def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray:
-    """Closed curve through a loop of landmarks (n, 2), (n_points, 2); sharp at the mouth corners.
+    """Closed curve (n_points, 2) through landmarks `loop_px` (n, 2); sharp at the mouth corners.
 
     The first point and the one farthest from it (the other corner, as the 66-point scheme has
     them) are where the upper and the lower half meet.

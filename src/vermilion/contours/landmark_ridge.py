@@ -24,7 +24,7 @@ class LandmarkRidgeDetector(RidgeDetector):
     kind = "landmarks"
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
-        """Name of the contour -> (size, size) likelihood of a cropped region."""
+        """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
         colours = blurred_colours(image)
         landmarks = {"inner": loop_spline(region.inner_px), "outer": loop_spline(region.outer_px)}
         reach = self.reach * self.interocular_size_px

@@ -26,7 +26,7 @@ def lip_planes(
     """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
 
     `outer`: probability of lip against skin, of two normal distributions with one covariance
-    (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
+    (linear discriminant) in the channels `colours` (3, size, size). `inner`: how far the colour is from
     the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
     What is lip, the `curves` (n, 2) of both contours and the band of the pass say; `beside`: for
     `outer`, what lies just beside its curve, as lips pale towards their border.
@@ -67,7 +67,7 @@ def _probability(colours: np.ndarray, lip: np.ndarray, skin: np.ndarray) -> np.n
 
 
 def dark_lines(lightness: np.ndarray) -> np.ndarray:
-    """How much darker a place (size, size) is than what lies beside it; zero where it is not."""
+    """How much darker a place of `lightness` (size, size) is than what lies beside it; else zero."""
     blurred = ((scale, cv2.GaussianBlur(lightness, (0, 0), scale)) for scale in LINE_PX)
     found = [scale**2 * cv2.Laplacian(plane, cv2.CV_32F) for scale, plane in blurred]
     return np.maximum(np.maximum(*found), 0.0)

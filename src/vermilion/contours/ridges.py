@@ -163,7 +163,7 @@ class RidgeDetector(ContourDetector):
         return crease, beyond
 
     def ridge(self, curve: np.ndarray, strength: np.ndarray, region: MouthRegion) -> np.ndarray:
-        """Likelihood (size, size) about a curve (n, 2) that is so clear (n,)."""
+        """Likelihood (size, size) about a `curve` (n, 2) px of clearness `strength` (n,) in [0, 1]."""
         dense = np.concatenate([curve + t * (np.roll(curve, -1, 0) - curve) for t in (0.0, 0.5)])
         strength = np.concatenate([strength, strength])
         rows, columns = np.nonzero(region.mask)

@@ -67,7 +67,7 @@ class TrackRidgeDetector(RidgeDetector):
     inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
-        """Name of the contour -> (size, size) likelihood of a cropped region."""
+        """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
         colours = blurred_colours(image)
         outer, strength = self.outer_border(colours, region)
         outer = loop_spline(outer)
@@ -85,7 +85,7 @@ class TrackRidgeDetector(RidgeDetector):
     def outer_border(
         self, colours: np.ndarray, region: MouthRegion
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Outer border (n, 2) of a frame and how clear it is (n,), near the take's."""
+        """Outer border (n, 2) px near the take's, and how clear it is (n,), in `colours` (3, size, size)."""
         ring, size = smoothed_halves(region.outer_px, EDGE_PASSES), self.interocular_size_px
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
@@ -99,11 +99,11 @@ class TrackRidgeDetector(RidgeDetector):
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
 
     def part_offsets(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
-        """How far (n,) px each lip and each corner as a whole lies from the take's border in a frame.
+        """How far (n,) px each lip and corner as a whole lies from the take's border in a frame.
 
         Rolls and presses hide a good part of a lip, and corners come in as a mouth opens wide, which
         a track does not follow: farther than a border may be looked for place by place without
-        taking another edge for it.
+        taking another edge for it. `colours` (3, size, size); `ring` (n, 2) px, region.
         """
         size = self.interocular_size_px
         reach = self.lip_reach * size
@@ -125,7 +125,7 @@ class TrackRidgeDetector(RidgeDetector):
     def inner_border(
         self, colours: np.ndarray, region: MouthRegion, outer: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Inner border (m, 2) of a frame whose outer one (m, 2) is known, and how clear it is (m,)."""
+        """Inner border (m, 2) px and how clear it is (m,); `colours` (3, size, size), `outer` (m, 2) px."""
         reach = self.reach * self.interocular_size_px
         curve = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(self.inner_offset))
         curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
@@ -234,21 +234,26 @@ def learn_borders(
 
 
 def unwrapped(colours: np.ndarray, ring: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Colours (n, T, 3) at distances `places` (T,) or (n, T) outwards from a ring (n, 2)."""
+    """`colours` (3, h, w) at `places` (T,) or (n, T) px outwards from a `ring` (n, 2) px: (n, T, 3)."""
     places = np.broadcast_to(places, (len(ring), np.shape(places)[-1]))
     points = ring[:, None] + places[..., None] * outward_normals(ring)[:, None]
     return np.stack([sampled(plane, points) for plane in colours], axis=-1)
 
 
 def edge_strength(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """How steeply the probability of lip falls outwards, (F, n, T) a pixel, of colours (F, n, T, 3)."""
+    """How steeply the probability of lip falls outwards, (F, n, T) a pixel.
+
+    Args:
+        seen: (F, n, T, 3) colours along the normals.
+        direction, middle: (n, 3), (n,) discriminants, as of `TrackRidgeDetector`.
+    """
     log_odds = np.einsum("fntc,nc->fnt", seen, direction) - middle[None, :, None]
     lip = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))
     return np.maximum(-np.gradient(lip, STEP_PX, axis=2), 0.0)
 
 
 def normalised_strength(fall: np.ndarray) -> np.ndarray:
-    """Falls (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
+    """Strengths `fall` (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
     return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
 
 

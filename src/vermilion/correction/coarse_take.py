@@ -120,6 +120,6 @@ class CoarseTake:
 
 
 def frames_around(frames: Sequence[int], known: np.ndarray, reach: int) -> np.ndarray:
-    """Those of the `known` frame numbers that lie within `reach` of one of `frames`, ascending."""
+    """Those (F,) of the frame numbers `known` (K,) within `reach` of one of `frames`, ascending."""
     apart = np.abs(np.subtract.outer(np.sort(known), np.asarray(frames)))
     return np.sort(known)[apart.min(axis=1) <= reach]

@@ -54,7 +54,7 @@ class LinearConstraints:
         return LinearConstraints(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     def evaluate(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """d . sum c v, (m,) mm, of a mesh or a displacement (V, 3) mm."""
+        """d . sum c v, (m,) mm, of a mesh or displacements `vertices_mm` (V, 3)."""
         points = (vertices_mm[self.vertices] * self.coefficients[..., None]).sum(axis=1)
         return (points * self.directions).sum(axis=1)
 
@@ -125,7 +125,7 @@ class ConstraintSolver:
     def displacements(
         self, constraints: Sequence[LinearConstraints], forces: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Displacements (F, N, 3) mm of the integrator's free vertices, all frames solved together."""
+        """Displacements (F, N, 3) mm of the integrator's free vertices, by each frame's `forces` (m,)."""
         right = np.zeros((len(self._integrator.free), 3, len(constraints)))
         for f, (of_frame, strength) in enumerate(zip(constraints, forces, strict=True)):
             pushes = self._shares(of_frame).T @ (strength[:, None] * of_frame.directions)

@@ -42,7 +42,7 @@ class ImageContours:
     def of(
         cls, face: FaceModel, camera: Camera, measured: Mapping[str, np.ndarray]
     ) -> ImageContours:
-        """From IMAGE_ARRAYS of feature files: rings (F, n, 2) px, found (F, n) and valid (F,) bool.
+        """From `measured`, IMAGE_ARRAYS: rings (F, n, 2) px, found (F, n) and valid (F,) bool.
 
         In a frame that is not valid nothing counts as found.
         """

@@ -40,7 +40,7 @@ class LipSamples:
 
     @classmethod
     def of(cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray) -> LipSamples:
-        """Of both rings of a face, with lengths on a person's neutral (V, 3)."""
+        """Of both rings of a face, with lengths on a person's `neutral_mm` (V, 3), head frame."""
         lengths = []
         for ring in (outer, inner):
             points = ring.points(neutral_mm)

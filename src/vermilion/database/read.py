@@ -64,6 +64,7 @@ class LipDatabase:
 
     @property
     def subjects(self) -> tuple[str, ...]:
+        """Their names, sorted."""
         return tuple(sorted({subject for subject, _ in self.takes}))
 
     def neutral_mm(self, subject: str) -> np.ndarray:

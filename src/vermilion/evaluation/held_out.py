@@ -77,7 +77,12 @@ def points_on_truth(
     max_distance_mm: float,
     max_normal_angle_deg: float,
 ) -> SurfacePoints:
-    """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`."""
+    """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`.
+
+    Args:
+        h_neutral_mm, truth_neutral_mm: (V_H, 3), (V', 3), the same frame in the world of the rig.
+        truth_triangles: (T', 3).
+    """
     return truth_of_vertices(
         points_on_h(correspondence),
         np.asarray(h_neutral_mm, dtype=np.float64),
@@ -105,6 +110,7 @@ def sums_of_contours(
     Args:
         sequence_mm, coarse_mm: (F, V, 3) in the camera's world.
         outer_px, inner_px: (F, n, 2) contour points found in the image; NaN where none.
+        clips: (F,) clip of each frame.
     """
     eyes = camera.project(coarse_mm[:, tracker.landmarks[list(_EYE_CORNERS)]])
     distance = contour_error(
@@ -136,7 +142,7 @@ def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers) -> np
 
 
 def shown_rows(error_mm: np.ndarray, count: int) -> np.ndarray:
-    """Rows, ascending, of the worst frame (F,) mm in each of `count` equal stretches."""
+    """Rows, ascending, of the frame of the largest `error_mm` (F,) in each of `count` equal stretches."""
     stretches = np.array_split(np.arange(len(error_mm)), min(count, len(error_mm)))
     filled = np.nan_to_num(error_mm)
     return np.array([part[np.argmax(filled[part])] for part in stretches if len(part)])

@@ -151,7 +151,7 @@ def evaluate_reconstruction(
     """Measure **H** itself against known truth, in the rig's world, without alignment.
 
     Args:
-        sequence_mm: (F, V, 3) of H.
+        sequence_mm: (F, V, 3) of H, world; frames: (F,) frame numbers.
         reference: truth, followed from the neutral.
         drift_mm: (F, V) of `drift`.
         seen: (F, V) bool, reference points that enough cameras see; the region `visible` is what
@@ -174,7 +174,7 @@ def evaluate_reconstruction(
 
 
 def sums_of_layers(errors: np.ndarray, clips: np.ndarray) -> ClipSums:
-    """Sums behind `feature_error`, of the RMS error of each frame's layer (F,); NaN does not count."""
+    """Sums by `clips` (F,) of the RMS `errors` (F,) of each frame's layer; NaN does not count."""
     known = np.isfinite(errors)
     return ClipSums(
         {
@@ -185,7 +185,7 @@ def sums_of_layers(errors: np.ndarray, clips: np.ndarray) -> ClipSums:
 
 
 def with_layer_errors(table: pd.DataFrame, errors: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """The table of `TakeResult` with a column `feature_error`: of each regressor (F,), else NaN."""
+    """The table of `TakeResult` with a column `feature_error`: regressor -> `errors` (F,), else NaN."""
     column = np.full(len(table), np.nan)
     for name, of_frames in errors.items():
         column[(table["regressor"] == name).to_numpy()] = of_frames

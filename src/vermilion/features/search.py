@@ -163,7 +163,7 @@ def find_inner(
 
 
 def sample(values: np.ndarray, points_px: np.ndarray) -> np.ndarray:
-    """Bilinear values (h, w) at pixels (n, m, 2), zero outside, (n, m) float64."""
+    """Bilinear `values` (h, w) at `points_px` (n, m, 2), zero outside, (n, m) float64."""
     x = (points_px[..., 0] - 0.5).astype(np.float32)
     y = (points_px[..., 1] - 0.5).astype(np.float32)
     found = cv2.remap(

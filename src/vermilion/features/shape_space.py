@@ -27,10 +27,11 @@ class ShapeSpace:
 
     @property
     def size(self) -> int:
+        """Number of components."""
         return len(self.projection)
 
     def coefficients(self, displacement_mm: np.ndarray) -> np.ndarray:
-        """Coefficients (F, P) mm of displacements from the neutral (F, V, 3) in the head frame."""
+        """Coefficients (F, P) mm of `displacement_mm` (F, V, 3) from the neutral, head frame."""
         return displacement_mm.reshape(len(displacement_mm), -1) @ self.projection.T
 
 

@@ -75,8 +75,8 @@ class Curve:
 def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
     """Clip label of each row: contiguous stretches of a sequence, (F,) int.
 
-    Frames are in order of time within a sequence. Clips are shorter than `clip_frames` where that
-    is needed to have one for every fold.
+    Frames are in order of time within one of the `sequences` (F,). Clips are shorter than `clip_frames`
+    where that is needed to have one for every fold.
     """
     sequences = np.asarray(sequences)
     clip_frames = max(1, min(clip_frames, len(sequences) // n_folds))
@@ -164,7 +164,10 @@ def held_out_novelty(
     clips: np.ndarray,
     n_folds: int,
 ) -> np.ndarray:
-    """Novelty (F,) of every frame for a training that has not seen its clip."""
+    """Novelty (F,) of `features` (F, M) for a training that has not seen their clip.
+
+    `sequences` and `clips` (F,) are labels, as in `cross_validate`.
+    """
     novelty = np.empty(len(features))
     for train, held in folds_of(clips, n_folds):
         tried = clone(estimator)

@@ -72,7 +72,7 @@ class KernelRegressor(LinearOutputs):
         return self.kernel(scaled, self.pivots_) @ self.whitening_
 
     def kernel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """k (F, G) between scaled features (F, M) and (G, M)."""
+        """k (F, G) between scaled features `first` (F, M) and `second` (G, M)."""
         smooth = 1.0 / np.sqrt(1.0 + 2.0 * self.beta * cdist(first, second, "sqeuclidean"))
         return smooth + self.linear * (first @ second.T)
 
@@ -80,7 +80,7 @@ class KernelRegressor(LinearOutputs):
         return 1.0 + self.linear * (scaled**2).sum(axis=1)
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """Standard deviation of a prediction, in units of the smooth part's prior deviation, (F,).
+        """Deviation (F,) of the prediction for `features` (F, M), per the smooth part's prior deviation.
 
         With what the pivots cannot tell; the noise of a single frame is not in it.
         """

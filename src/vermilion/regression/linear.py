@@ -27,7 +27,8 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
 
     Attributes (fitted): `coefficients_` (P, R) and `basis_` (R, K), whose product are the weights,
     `person_biases_` (G, K), `bias_` (K,) of anybody else, `mean_activation_` (P,), `deviation_` (P, P)
-    from the centred design to what is uncertain of a prediction, `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
+    from the centred design to what is uncertain of a prediction, `feature_mean_`, `feature_scale_`,
+    `feature_low_`, `feature_high_` (M,).
     """
 
     #: Fitted arrays, by the names that they have in a model file with an underscore.
@@ -121,7 +122,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
     def fit_inputs(
         self, features: np.ndarray, sequences: np.ndarray | None = None, **chosen
     ) -> np.ndarray:
-        """Fit all but the weights on features (F, M): enough for `novelty`. Returns the design."""
+        """Design (F, P) of `features` (F, M) in `sequences` (F,): fits all but the weights."""
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2:
             raise ValueError(f"features must be (F, M), got {features.shape}")
@@ -138,7 +139,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         return design
 
     def scaled(self, features: np.ndarray) -> np.ndarray:
-        """Features (F, M) in the estimator's own scale, float64."""
+        """`features` (F, M) in the estimator's own scale, (F, M) float64."""
         check_is_fitted(self, "feature_scale_")
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or features.shape[1] != self.n_features_in_:
@@ -153,11 +154,11 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         return self.mean_activation_ + trust(scaled, held, self.fade) * added
 
     def mixture(self, features: np.ndarray) -> np.ndarray:
-        """Coefficients (F, R) of the basis, in its precision."""
+        """Coefficients (F, R) of the basis for `features` (F, M), in its precision."""
         return (self.activations(features) @ self.coefficients_).astype(self.basis_.dtype)
 
     def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
-        """Outputs (F, K), in the precision of the weights; `person` as labelled in `fit`."""
+        """Outputs (F, K) for `features` (F, M), in the precision of the weights; `person` as in `fit`."""
         return self.mixture(features) @ self.basis_ + self.bias_of(person)
 
     def bias_of(self, person: int | None) -> np.ndarray:

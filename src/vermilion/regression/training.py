@@ -136,8 +136,9 @@ def train(
     # GR is for unseen subjects, so its folds hold out whole people.
     by_person = group == "GR" and len(np.unique(data.persons)) >= LEAST_PEOPLE
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
+    weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
     curve = cross_validate(
-        estimator, features, target_gram(data.layers, np.repeat(area_mm2 / area_mm2.mean(), 9)), data.sequences,
+        estimator, features, target_gram(data.layers, weights), data.sequences,
         data.persons if by_person else clips, **selection.grid(kind), n_folds=selection.folds,
         persons=persons,
     )  # fmt: skip
