@@ -76,16 +76,9 @@ class FeatureTable:
         write_arrays(path, compressed=True, **{name: getattr(self, name) for name in ARRAYS})
 
     @classmethod
-    def load(cls, paths: str | Path | Sequence[str | Path]) -> FeatureTable:
-        """Read one file, or join several. Raises InputError where one is not what `save` wrote."""
-        paths = [paths] if isinstance(paths, str | Path) else list(paths)
-        parts = [_read(path) for path in paths]
-        joined = {
-            name: np.concatenate([part[name] for part in parts])
-            for name in ARRAYS
-            if name != "names"
-        }
-        return cls(names=parts[0]["names"], **joined)
+    def load(cls, path: str | Path) -> FeatureTable:
+        """Read what `save` wrote. Raises InputError on any other file."""
+        return cls(**read_arrays(path, "feature file", ARRAYS))
 
 
 def feature_names(n_shape: int, space: str = "image") -> np.ndarray:
@@ -121,7 +114,3 @@ def quality_row(
     if outer < least_found:
         return QualityRow(frame, False, f"only {outer:.0%} of the outer contour found", figures)
     return QualityRow(frame, figures=figures)
-
-
-def _read(path: str | Path) -> dict[str, np.ndarray]:
-    return read_arrays(path, "feature file", ARRAYS)

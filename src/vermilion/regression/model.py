@@ -205,18 +205,12 @@ def _check_header(file: h5py.File, path: str | Path) -> None:
             path=path,
         )
     version = int(file.attrs["format_version"])
-    if version < FORMAT_VERSION:
+    if version != FORMAT_VERSION:
+        newer = version > FORMAT_VERSION
         raise ModelFileError(
-            f"format version {version}, of an older Vermilion",
+            f"format version {version}, written by Vermilion {file.attrs.get('vermilion_version')}",
             f"version {FORMAT_VERSION}",
-            "Train the regressor again with this version.",
-            path=path,
-        )
-    if version > FORMAT_VERSION:
-        raise ModelFileError(
-            f"format version {version}, written by Vermilion {file.attrs['vermilion_version']}",
-            f"at most version {FORMAT_VERSION}",
-            "Update Vermilion, or train the regressor with this version.",
+            f"{'Update Vermilion, or train' if newer else 'Train'} the regressor again with this version.",
             path=path,
         )
 
