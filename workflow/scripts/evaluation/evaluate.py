@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.baselines.contour_tracker import ContourTracker, FoundContours
+from vermilion.baselines.contour_tracker import ContourTracker
 from vermilion.baselines.lip_shapes import LipShapes
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.config.regressors import measure_name
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct_with_layers
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation import held_out
@@ -112,11 +113,10 @@ def contour_track(inputs, tracker, fit, take, correspondence, contours, cfg):
     shapes = LipShapes.load(inputs.shapes).on(
         correspondence.coarse_neutral_mm, tracker.triangles, seam_mm
     )
-    found, weights = FoundContours(**contours), fit.weights[fit.index_of(take.frames)]
-    fitted = ContourTracker(tracker, shapes, found.outer_px.shape[1], ridge)
-    return fitted.track(
-        take.coarse_mm, take.rotation, take.translation_mm, weights, fit.camera, found
-    )
+    # A frame whose features are not valid may have contours all the same.
+    take = replace(take, image=ImageContours(tracker, fit.camera, **contours))
+    fitted = ContourTracker(tracker, shapes, take.image.outer_px.shape[1], ridge)
+    return fitted.track(take, fit.weights[fit.index_of(take.frames)])
 
 
 def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
