@@ -30,12 +30,11 @@ def quality_row(frame, tracked, has_features, figures):
     return QualityRow(frame, True, "outside the training's span" if outside else "", figures)
 
 
-def corrected_take(inputs, cfg, frames, fps):
+def corrected_take(inputs, tracker, fit, cfg, frames, fps):
     """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor that made them."""
     settings = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
-    tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
     pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
     model = with_known_neutrals(load_model(inputs.model), tracker.triangles, *pairs)
     take = CoarseTake.load(
@@ -51,7 +50,8 @@ def main(snakemake):
     inputs, params, out = snakemake.input, snakemake.params, snakemake.output
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
-    take, corrected, model = corrected_take(inputs, params.cfg, frames, params.fps)
+    tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    take, corrected, model = corrected_take(inputs, tracker, fit, params.cfg, frames, params.fps)
     # The image shows what the file holds: beyond its precision, sums differ from run to run.
     corrected = corrected.astype(np.float32).astype(np.float64)
     write_sequence(out.corrected, corrected)
@@ -73,11 +73,10 @@ def main(snakemake):
     ]  # fmt: skip
     write_quality(out.quality, *place, "apply", rows_of_quality)
 
-    source, fit = open_frames(params.source, *place), TrackedTake.load(inputs.fit)
-    camera, pose = fit.camera, (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
+    source, camera = open_frames(params.source, *place), fit.camera
+    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
     view = framing(
-        FaceModel.load(inputs.tracker), take.neutral_mm, *pose, fit.valid, camera, overlay.margin,
-        overlay.panel_height_px,
+        tracker, take.neutral_mm, *pose, fit.valid, camera, overlay.margin, overlay.panel_height_px
     )  # fmt: skip
     images = overlay_frames(
         view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames,

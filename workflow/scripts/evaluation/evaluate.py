@@ -134,20 +134,18 @@ def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
     return sums
 
 
-def corrected_takes(inputs, cfg, frames, fps):
+def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
     """The frames' coarse take, what each regressor makes of it, and the oracle's meshes and layers."""
     section = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
     settings = CorrectionSettings.of(section, fps)
     take = CoarseTake.load(
-        FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit),
-        Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features, frames,
-        section.reach_frames(fps),
+        tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
+        frames, section.reach_frames(fps),
     )  # fmt: skip
     rows = np.searchsorted(take.frames, frames)
     regressed = regressors(inputs, take, settings, rows)
-    correspondence = Correspondence.load(inputs.correspondence)
     return take[rows], regressed, *oracle(inputs, correspondence, take, settings, rows)
 
 
@@ -160,7 +158,9 @@ def main(snakemake):
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    take, regressed, by_truth, true = corrected_takes(inputs, cfg, frames, snakemake.params.fps)
+    take, regressed, by_truth, true = corrected_takes(
+        inputs, tracker, fit, correspondence, cfg, frames, snakemake.params.fps
+    )
     contours = read_chunks(inputs.features, frames, CONTOURS)
     sequences = {"base": take.coarse_mm} | ({} if by_truth is None else {"oracle": by_truth})
     sequences["contour"] = contour_track(inputs, tracker, fit, take, correspondence, contours, cfg)
