@@ -8,8 +8,7 @@ contour is the visible border of the vermilion, the true inner one that of the o
 sees the true mesh. Contours are looked for from **C** of the run, in the head frame, as the workflow
 does, or from the landmarks' curves where the take is not yet tracked, in the maps of
 
-- `boosted`: boosted edge learning, trained anew on the take's labelled frames, as `auto` does, and
-  measured on the others; before the take is tracked its labels count as drawn;
+- `boosted`: boosted edge learning, trained anew on the take's labelled frames and measured on the others;
 - `track`: the tracked lips moved to the border of the lips' colour, learnt from the take;
 - `landmarks`: the landmarks' curves moved there.
 
@@ -30,12 +29,12 @@ import pandas as pd
 
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.curves import loop_spline
-from vermilion.contours.label_offset import without_lean
+from vermilion.contours.labelled_frames import LabelledFrame
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
-from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
+from vermilion.contours.training import TrainingSettings, train_detector
 from vermilion.evaluation.contour_error import distance_to_polyline
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
@@ -171,8 +170,6 @@ def measure(results: Path, take: str, capture: Path, truth: Path, every: int = 1
             rings.__getitem__,
             cfg.track.reach,
         )
-        limits = cfg.label_tolerance, cfg.label_reach
-        labelled, _ = without_lean(labelled, detectors["track"], rings.get, *limits)
     if labelled:
         detectors["boosted"] = train_detector(labelled, TrainingSettings())
     rows = []

@@ -28,11 +28,12 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from vermilion.contours import training
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
 from vermilion.contours.curves import loop_spline
+from vermilion.contours.labelled_frames import LabelledFrame
 from vermilion.contours.labels import CONTOURS, label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
-from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
+from vermilion.contours.training import TrainingSettings, train_detector
 from vermilion.features.search import SearchSettings, find_inner, find_outer
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.networks import NetworkDetector

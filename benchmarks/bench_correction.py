@@ -8,7 +8,7 @@ frames, whose predictions have the principal components of `SPECTRA`. For each, 
 this core's time (what else runs on the machine does not count), the least of several rounds in which
 the parts take turns, for:
 
-- the whole: features -> layers -> right-hand sides -> solve -> vertices (`Corrector.correct`);
+- the whole: features -> layers -> right-hand sides -> solve -> vertices (`Corrector.correct_heads`);
 - its parts;
 - the triangular solves of the same system alone, same number of frames together;
 - the peer: the gradients decoded by NumPy, the right-hand side by a sparse product, SciPy's SuperLU
@@ -22,14 +22,16 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from vermilion.correction.correct import Corrector
-from vermilion.correction.image_agreement import ImageAgreement
+from vermilion.config.correction import CorrectionConfig
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, Corrector
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.layers import decode_layers
 from vermilion.correction.right_side import LANES, TURN_SERIES, accumulate_mixture, turn_limits
@@ -163,23 +165,37 @@ def main() -> None:
     print(f"mesh {len(vertices)} vertices, mask {len(mask)} triangles")
     for kind in SPECTRA:
         model = fitted_model(kind, triangles, mask, arguments.basis_error)
-        report(kind, Corrector(model, vertices, triangles, detail_mm=10.0), coarse, features)
-    corrector = Corrector(model, vertices, triangles, detail_mm=10.0)
-    report_image(corrector, vertices, coarse, features, triangles)
-    corrector = Corrector(model, vertices, triangles)  # the peer knows no displacements
+        take, settings = take_of(vertices, triangles, coarse, features), settings_of(10.0)
+        report(kind, Corrector(model, take, settings), take)
+    report_image(model, take, settings)
+    corrector = Corrector(model, take, settings_of(0.0))  # the peer knows no displacements
     other = peer(corrector, coarse, features, triangles)
-    difference = np.abs(other() - corrector.correct(coarse[:8], features[:8])).max()
+    difference = np.abs(other() - corrector.correct(take[:8])).max()
     numpy_ms = best_ms({"peer": (other, 8)}, rounds=2)["peer"]
     print(f"peer (NumPy, SciPy SuperLU)     {numpy_ms:8.2f} ms a frame, {difference:.1e} mm apart")
 
 
-def report(kind: str, corrector: Corrector, coarse: np.ndarray, features: np.ndarray) -> None:
+def settings_of(detail_mm: float) -> CorrectionSettings:
+    """Without the image and without a filter over time."""
+    return CorrectionSettings(seam_mm=16.0, detail_mm=detail_mm, smooth_frames=0, image=None)
+
+
+def take_of(vertices, triangles, coarse: np.ndarray, features: np.ndarray) -> CoarseTake:
+    """Heads that stand still at the origin of the world."""
+    n = len(coarse)
+    pose = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+    valid = np.ones(n, dtype=bool)
+    return CoarseTake(np.arange(n), coarse, triangles, vertices, *pose, features, valid)
+
+
+def report(kind: str, corrector: Corrector, take: CoarseTake) -> None:
     """Print the figures of one regressor."""
     model, integrator = corrector.model, corrector.integrator
+    coarse, features, frames = take.coarse_mm, take.features, take.frames
     right = np.random.default_rng(3).normal(size=(len(integrator.free), 3 * LANES))
     ms = best_ms(
         {
-            "whole": (lambda: corrector.correct(coarse, features), N_FRAMES),
+            "whole": (lambda: corrector.correct_heads(coarse, features, frames), N_FRAMES),
             "solves": (lambda: integrator.factor.solve(right), LANES),
             "mixture": (lambda: model.mixture(features), N_FRAMES),
             "sides": (right_sides(corrector), LANES),
@@ -221,11 +237,9 @@ def mouth_on(vertices: np.ndarray, triangles: np.ndarray) -> FaceModel:
     )
 
 
-def report_image(
-    corrector: Corrector, vertices: np.ndarray, coarse: np.ndarray, features: np.ndarray, triangles
-) -> None:
+def report_image(model: LipModel, take: CoarseTake, settings: CorrectionSettings) -> None:
     """Print the figures of the correction with pose, contours and contact."""
-    face = mouth_on(vertices, triangles)
+    face = mouth_on(take.neutral_mm, take.triangles)
     camera = pinhole(
         "cam",
         1500.0,
@@ -233,22 +247,20 @@ def report_image(
         720,
         look_at(np.array([0, 0, 700.0]), np.zeros(3), np.array([0, 1.0, 0])),
     )
-    pose = np.tile(np.eye(3), (N_FRAMES, 1, 1)), np.zeros((N_FRAMES, 3))
     rng = np.random.default_rng(5)
     found = [
-        camera.project(ring.points(coarse)) + rng.normal(scale=0.5, size=(N_FRAMES, 80, 2))
+        camera.project(ring.points(take.coarse_mm)) + rng.normal(scale=0.5, size=(N_FRAMES, 80, 2))
         for ring in lip_rings(face, 80)
     ]
     known = np.ones((N_FRAMES, 80), dtype=bool)
-    image = ImageContours(face, camera, np.arange(N_FRAMES), *found, known, known)
-    fit = ImageAgreement.of(corrector.integrator, vertices, image)
+    take = replace(take, image=ImageContours(face, camera, *found, known, known))
+    settings = replace(settings, image=CorrectionSettings.of(CorrectionConfig(), 30.0).image)
+    with_image = Corrector(model, take, settings)
+    without = Corrector(model, take, replace(settings, image=None))
     ms = best_ms(
         {
-            "whole": (
-                lambda: fit.fit(corrector.correct(coarse, features), coarse, *pose, image),
-                N_FRAMES,
-            ),
-            "base": (lambda: corrector.correct(coarse, features), N_FRAMES),
+            "whole": (lambda: with_image.correct(take), N_FRAMES),
+            "base": (lambda: without.correct(take), N_FRAMES),
         },
         rounds=4,
     )

@@ -28,10 +28,15 @@ def _text(value):
     return [str(v) for v in value] if isinstance(value, list) else str(value)
 
 
-def run_script(name: str, *, wildcards=(), params=(), input=(), output=(), log="log") -> None:
-    """Call `main` of `workflow/scripts/<name>.py`; standard output and error stay as they are."""
+def script(name: str):
+    """The module `workflow/scripts/<name>.py`."""
     spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def run_script(name: str, *, wildcards=(), params=(), input=(), output=(), log="log") -> None:
+    """Call `main` of `workflow/scripts/<name>.py`; standard output and error stay as they are."""
     job = Job(dict(wildcards), dict(params), dict(input), dict(output), log)
-    module.main(job)
+    script(name).main(job)

@@ -11,7 +11,8 @@ from vermilion.config.correction import LayersConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.config.database import DatabaseConfig
 from vermilion.config.training import TrainingConfig
-from vermilion.correction.correct import correct_sequence, correct_with_layers
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.database.read import LipDatabase
 from vermilion.geometry.alignment import similarity_alignment
@@ -188,33 +189,30 @@ def coarse_of(scene, subject):
     return read_sequence([folder / f"{c}.npy" for c in CHUNKS]).astype(np.float64)
 
 
-def corrected_by(scene, subject, regressor):
-    correspondence = Correspondence.load(scene.root / f"subjects/{subject}/correspondence.npz")
+def take_of(scene, subject):
+    """All frames of a subject's take, without images."""
     fit = TrackedTake.load(scene.root / f"takes/{subject}/rom/tracking/fit.npz")
-    return correct_sequence(
-        load_model(scene.root / f"models/{regressor}.h5"),
-        coarse_of(scene, subject),
-        correspondence.coarse_triangles,
-        Identity.load(scene.root / f"subjects/{subject}/identity.npz").neutral_mm,
-        fit.world_from_head_rotation,
-        fit.world_from_head_translation_mm,
-        scene.features[subject],
-    )
+    neutral = Correspondence.load(scene.root / f"subjects/{subject}/correspondence.npz")
+    identity = scene.root / f"subjects/{subject}/identity.npz"
+    return CoarseTake(
+        fit.frames, coarse_of(scene, subject), neutral.coarse_triangles,
+        Identity.load(identity).neutral_mm, fit.world_from_head_rotation,
+        fit.world_from_head_translation_mm, scene.features[subject], fit.valid,
+    )  # fmt: skip
+
+
+def corrected_by(scene, subject, regressor):
+    model = load_model(scene.root / f"models/{regressor}.h5")
+    take = take_of(scene, subject)
+    return correct(model, take, CorrectionSettings(16.0, 0.0, 0, None))
 
 
 def corrected_by_truth(scene, subject):
-    correspondence = Correspondence.load(scene.root / f"subjects/{subject}/correspondence.npz")
-    folder = scene.root / f"takes/{subject}/rom"
-    fit = TrackedTake.load(folder / "tracking/fit.npz")
-    return correct_with_layers(
-        correspondence.mask,
-        np.concatenate([np.load(folder / f"correction/layers/{c}.npz")["layers"] for c in CHUNKS]),
-        coarse_of(scene, subject),
-        correspondence.coarse_triangles,
-        correspondence.coarse_neutral_mm,
-        fit.world_from_head_rotation,
-        fit.world_from_head_translation_mm,
-    )
+    mask = Correspondence.load(scene.root / f"subjects/{subject}/correspondence.npz").mask
+    folder = scene.root / f"takes/{subject}/rom/correction/layers"
+    layers = np.concatenate([np.load(folder / f"{c}.npz")["layers"] for c in CHUNKS])
+    take = take_of(scene, subject)
+    return correct_with_layers(mask, layers, None, take, CorrectionSettings(16.0, 0.0, 0, None))
 
 
 def test_correspondence_covers_the_mouth_and_is_near(scene):

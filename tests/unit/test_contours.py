@@ -12,13 +12,14 @@ from tests.unit.mouths import draw_mouth
 from vermilion.contours.boosting import BoostingSettings, bin_edges, fit_forest
 from vermilion.contours.channels import LEVELS, PAD, image_channels, integral_images
 from vermilion.contours.curves import loop_spline
-from vermilion.contours.detector import load_detector
+from vermilion.contours.detector_file import load_detector
+from vermilion.contours.labelled_frames import LabelledFrame
 from vermilion.contours.labels import contact_lines, dark_valley, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.paths import cheapest_ring
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
-from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
+from vermilion.contours.training import TrainingSettings, train_detector
 from vermilion.storage.errors import InputError, ModelFileError
 
 SMALL = TrainingSettings(

@@ -8,7 +8,7 @@ from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import clips_of, cross_validate, target_gram
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork, temporal_prototypes
 from vermilion.regression.kernel import KernelRegressor
-from vermilion.regression.linear import bias_of_a_stranger
+from vermilion.regression.linear import unseen_subject_bias
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_cross_validation_equals_fitting_and_predicting(data):
     clips = clips_of(sequences, 15, 5)
     alphas, betas = [1e-4, 1e-2, 10.0], [0.1, 3.0]
     groups = ["a"] * 3 + ["b"] * 4
-    given = (features, target_gram(targets, weights), weights.sum(), sequences, clips)
+    given = (features, target_gram(targets, weights), sequences, clips)
     network = RBFNetwork(feature_groups=groups, reach=0.1)
     curve = cross_validate(network, *given, alphas=alphas, betas=betas)
     affine = cross_validate(AffineRegressor(), *given, alphas=alphas)
@@ -71,7 +71,7 @@ def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(dat
     targets = targets + 5.0 * persons[:, None]
     clips = clips_of(persons, 10, 4)
     curve = cross_validate(
-        AffineRegressor(), features, target_gram(targets), 30, persons, clips,
+        AffineRegressor(), features, target_gram(targets), persons, clips,
         alphas=[0.1], n_folds=4, persons=persons,
     )  # fmt: skip
     for k, (train, held) in enumerate(GroupKFold(4).split(clips, groups=clips)):
@@ -101,18 +101,18 @@ def test_a_bias_a_person_takes_what_no_feature_tells(data):
         )
 
 
-def test_a_stranger_gets_the_mean_identity_drawn_towards_none():
+def test_an_unseen_subject_gets_the_mean_identity_drawn_towards_none():
     neutral = np.zeros(400)
     rng = np.random.default_rng(0)
     alike = 1.0 + 0.01 * rng.normal(size=(4, 400))
-    np.testing.assert_allclose(bias_of_a_stranger(alike, neutral), 1.0, atol=0.03)
+    np.testing.assert_allclose(unseen_subject_bias(alike, neutral), 1.0, atol=0.03)
     unlike = rng.normal(size=(4, 400))
-    assert np.abs(bias_of_a_stranger(unlike, neutral)).mean() < 0.1
-    np.testing.assert_array_equal(bias_of_a_stranger(alike[:1], neutral), 0.0)
+    assert np.abs(unseen_subject_bias(unlike, neutral)).mean() < 0.1
+    np.testing.assert_array_equal(unseen_subject_bias(alike[:1], neutral), 0.0)
 
 
 def test_what_people_share_in_layers_is_kept_though_their_displacements_differ():
-    """A stranger's place is not guessed from people who lie now here, now there."""
+    """An unseen subject's place is not guessed from people who lie now here, now there."""
     rng = np.random.default_rng(3)
     persons, features = np.repeat(np.arange(4), 30), rng.normal(size=(120, 5))
     features[::30] = 0.0
@@ -127,7 +127,7 @@ def test_what_people_share_in_layers_is_kept_though_their_displacements_differ()
     assert np.abs(together.predict(np.zeros((1, 5)))[0][:50] - 1.0).mean() > 0.1
 
 
-def test_a_stranger_gets_no_identity_of_the_only_person_known():
+def test_an_unseen_subject_gets_no_identity_of_the_only_person_known():
     """Their expressions are moved alike, their neutral is not."""
     rng = np.random.default_rng(4)
     features, persons = rng.normal(size=(60, 5)), np.zeros(60, dtype=int)
@@ -143,7 +143,7 @@ def test_choice_takes_the_smoothest_within_one_standard_error(data):
     features, targets = data
     clips = clips_of(np.zeros(120), 15, 5)
     curve = cross_validate(
-        AffineRegressor(), features, target_gram(targets), 30, np.zeros(120), clips,
+        AffineRegressor(), features, target_gram(targets), np.zeros(120), clips,
         alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3],
     )  # fmt: skip
     least, simplest = curve.choose("least"), curve.choose("simplest")

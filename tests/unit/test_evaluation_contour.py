@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.heads import small_tracker
-from vermilion.baselines.contour_tracker import ContourTracker, FoundContours
+from vermilion.baselines.contour_tracker import ContourTracker
 from vermilion.baselines.lip_shapes import LipShapes, medoids
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.layers import correction_layers
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.camera import look_at, pinhole
@@ -56,7 +60,7 @@ def contours_of(model, camera, vertices):
     """What a perfect detector finds: the rings' own projections, the mouth open."""
     outer, inner = (camera.project(ring.points(vertices))[None] for ring in lip_rings(model, 80))
     found = np.ones((1, 80), dtype=bool)
-    return FoundContours(outer, inner, found, found)
+    return ImageContours(model, camera, outer, inner, found, found)
 
 
 def test_fitted_lips_lie_on_the_contours_and_stay_where_there_are_none(model):
@@ -68,8 +72,12 @@ def test_fitted_lips_lie_on_the_contours_and_stay_where_there_are_none(model):
     camera = pinhole("cam", 900.0, 640, 480, look_at(mouth + 500 * FRONT, mouth, (0, 1, 0)))
     found = contours_of(model, camera, truth)
     still = np.eye(3)[None], np.zeros((1, 3))
+    take = CoarseTake(
+        np.zeros(1, int), open_mm[None], model.triangles, model.neutral_mm, *still, np.zeros((1, 0)),
+        np.ones(1, bool), found,
+    )  # fmt: skip
     weights = 0.3 * (np.array(model.expression_names) == "jawOpen")[None]
-    fitted = tracker.track(open_mm[None], *still, weights, camera, found)[0]
+    fitted = tracker.track(take, weights)[0]
     ring = lip_rings(model, 80)[0]
     before, after = (
         np.linalg.norm(camera.project(ring.points(mesh)) - found.outer_px[0], axis=1).mean()
@@ -83,7 +91,5 @@ def test_fitted_lips_lie_on_the_contours_and_stay_where_there_are_none(model):
     )
 
     nothing = np.zeros((1, 80), dtype=bool)
-    lost = FoundContours(found.outer_px, found.inner_px, nothing, nothing)
-    np.testing.assert_allclose(
-        tracker.track(open_mm[None], *still, weights, camera, lost)[0], open_mm, atol=1e-9
-    )
+    lost = replace(take, image=replace(found, outer_found=nothing, inner_found=nothing))
+    np.testing.assert_allclose(tracker.track(lost, weights)[0], open_mm, atol=1e-9)

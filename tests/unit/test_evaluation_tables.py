@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vermilion.config.regressors import in_order, kind_of
+from vermilion.config.regressors import in_order, kind_of, measure_name
 from vermilion.evaluation.contour_error import contour_error, distance_to_polyline
-from vermilion.evaluation.corrected import measure_name
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.files import load_sums, save_sums
 from vermilion.evaluation.held_out import shown_rows

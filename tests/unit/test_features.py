@@ -10,8 +10,9 @@ from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
 from vermilion.features.search import SearchSettings, find_inner, inward_normals
-from vermilion.features.shape_space import head_displacement, shape_space
-from vermilion.features.vector import FeatureTable, feature_names, judge
+from vermilion.features.shape_space import shape_space
+from vermilion.features.vector import FeatureTable, feature_names, quality_row
+from vermilion.geometry.head_frame import head_from_world
 from vermilion.geometry.mesh import vertex_areas
 from vermilion.storage.errors import InputError
 
@@ -147,7 +148,7 @@ def test_without_maps_or_without_maxima_the_models_contour_stands_in():
     assert not blank.outer_found.any()
     np.testing.assert_allclose(blank.outer_px, blank.model_outer_px, atol=0.5)
     np.testing.assert_allclose(blank.distances, nothing.distances, atol=0.02)
-    row = judge(3, blank, True, True, 0.6)
+    row = quality_row(3, blank, True, True, 0.6)
     assert not row.valid
     assert "0% of the outer contour" in row.reason
 
@@ -202,26 +203,22 @@ def test_displacement_forgets_the_pose():
     turn *= np.sign(np.linalg.det(turn))
     shift = np.array([[10.0, -4.0, 900.0]])
     world = local @ turn.T + shift
-    found = head_displacement(world, turn[None], shift, model.neutral_mm)
+    found = head_from_world(world, turn[None], shift) - model.neutral_mm
     np.testing.assert_allclose(found, local - model.neutral_mm, atol=1e-9)
 
 
-def test_feature_table_comes_back_as_written_and_joins_chunks(tmp_path):
+def test_feature_table_comes_back_as_written(tmp_path):
     model, camera = mouth_model(), facing_camera()
     found = sampler(model).find(model.neutral_mm, camera, None)
-    tables = [
-        FeatureTable.of(frames, np.ones((2, 3)), [found, found], [True, False])
-        for frames in ((0, 1), (2, 3))
-    ]
-    for index, table in enumerate(tables):
-        table.save(tmp_path / f"{index}.npz")
-    joined = FeatureTable.load([tmp_path / "0.npz", tmp_path / "1.npz"])
-    assert joined.frames.tolist() == [0, 1, 2, 3]
-    assert joined.features.shape == (4, 23)
-    assert joined.names.tolist() == feature_names(3).tolist()
-    assert joined.valid.tolist() == [True, False, True, False]
-    assert joined.outer_found.shape == joined.outer_px.shape[:2]
-    assert not joined.outer_found.any() and not joined.inner_found.any()  # no maps were given
+    table = FeatureTable.of((2, 3), np.ones((2, 3)), [found, found], [True, False])
+    table.save(tmp_path / "0.npz")
+    read = FeatureTable.load(tmp_path / "0.npz")
+    assert read.frames.tolist() == [2, 3]
+    assert read.features.shape == (2, 23)
+    assert read.names.tolist() == feature_names(3).tolist()
+    assert read.valid.tolist() == [True, False]
+    assert read.outer_found.shape == read.outer_px.shape[:2]
+    assert not read.outer_found.any() and not read.inner_found.any()  # no maps were given
     (tmp_path / "0.npz").write_bytes(b"PK damaged")
     with pytest.raises(InputError, match="unreadable feature file"):
         FeatureTable.load(tmp_path / "0.npz")

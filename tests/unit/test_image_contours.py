@@ -7,14 +7,12 @@ import pytest
 from scipy import sparse
 
 from tests import lip_patch
-from vermilion.correction.constraints import ConstraintSolver, Rows
-from vermilion.correction.correct import correct_with_layers
-from vermilion.correction.image_agreement import ImageAgreement
-from vermilion.correction.image_contours import (
-    ImageContours,
-    ImageContourSettings,
-    frames_around,
-)
+from vermilion.config.correction import CorrectionConfig
+from vermilion.correction.coarse_take import CoarseTake, frames_around
+from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
+from vermilion.correction.correct import CorrectionSettings, correct_with_layers
+from vermilion.correction.image_agreement import ImageAgreement, ImageAgreementSettings
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, smoothed_motion
@@ -23,7 +21,8 @@ from vermilion.geometry.rotations import rotation_matrix
 
 N_SAMPLES = 80
 CAMERA = lip_patch.cameras()["front"]
-OFF = ImageContourSettings(repose=False, contour_weight=0.0, contact=False)
+DEFAULTS = ImageAgreementSettings(**CorrectionConfig().image.model_dump())
+OFF = replace(DEFAULTS, repose=False, contour_weight=0.0, contact=False)
 CONTOURS = replace(OFF, contour_weight=1000.0)
 REPOSE = replace(OFF, repose=True)
 
@@ -49,24 +48,31 @@ def integrator():
     return LayerIntegrator(FACE.neutral_mm, FACE.triangles, MASK, seam_mm=0.0)
 
 
-def image_of(meshes_mm, settings, pose=None):
+def image_of(meshes_mm, pose=None):
     """What a perfect search finds in the images of meshes (F, V, 3) in the world."""
     rotation, translation = pose or (np.eye(3), np.zeros(3))
     world = np.asarray(meshes_mm) @ rotation.T + translation
     outer, inner = (CAMERA.project(ring.points(world)) for ring in lip_rings(FACE, N_SAMPLES))
     known = np.ones(outer.shape[:2], dtype=bool)
-    frames = np.arange(len(world))
-    return ImageContours(FACE, CAMERA, frames, outer, inner, known, known, settings)
+    return ImageContours(FACE, CAMERA, outer, inner, known, known)
 
 
-def fitted(corrected, image, coarse=None, pose=None):
-    n = len(corrected)
+def take_of(heads_mm, image, pose=None, frames=None):
+    """Coarse meshes (F, V, 3) of the head frame in one pose, with an image each."""
+    n = len(heads_mm)
     rotation, translation = pose or (np.eye(3), np.zeros(3))
     rotation, translation = np.tile(rotation, (n, 1, 1)), np.tile(translation, (n, 1))
+    world = heads_mm @ np.swapaxes(rotation, 1, 2) + translation[:, None]
+    return CoarseTake(
+        np.arange(n) if frames is None else frames, world, FACE.triangles, FACE.neutral_mm,
+        rotation, translation, np.zeros((n, 0)), np.ones(n, dtype=bool), image,
+    )  # fmt: skip
+
+
+def fitted(corrected, image, settings, coarse=None, pose=None, frames=None):
+    fit = ImageAgreement(integrator(), FACE.neutral_mm, FACE, N_SAMPLES, settings)
     coarse = corrected if coarse is None else coarse
-    coarse = coarse @ np.swapaxes(rotation, 1, 2) + translation[:, None]
-    fit = ImageAgreement.of(integrator(), FACE.neutral_mm, image)
-    return fit.fit(corrected, coarse, rotation, translation, image)
+    return fit.fit(corrected, take_of(coarse, image, pose, frames))
 
 
 def distance_px(mesh_mm, image, f=0):
@@ -85,41 +91,41 @@ def test_low_rank_update_is_the_minimum_of_the_whole_energy():
     vertices = rng.choice(solid.free, size=(12, 2), replace=False)
     directions = rng.normal(size=(12, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    rows = Rows(
+    rows = LinearConstraints(
         vertices, rng.uniform(0.2, 1, (12, 2)), directions, rng.normal(size=12),
         rng.uniform(0.1, 2, 12), np.zeros(12, dtype=bool),
     )  # fmt: skip
     solver = ConstraintSolver(solid, np.unique(vertices))
-    forces = solver.multipliers(rows)
+    forces = solver.forces(rows)
     move = np.zeros((FACE.n_vertices, 3))
-    move[solid.free] = solver.moves([rows], [forces])[0]
+    move[solid.free] = solver.displacements([rows], [forces])[0]
     jacobian = sparse.lil_matrix((12, 3 * FACE.n_vertices))
     for i, (pair, shares) in enumerate(zip(vertices, rows.coefficients, strict=True)):
         for vertex, share in zip(pair, shares, strict=True):
             jacobian[i, 3 * vertex : 3 * vertex + 3] += share * directions[i]
-    pull = jacobian.T @ ((rows.wanted - jacobian @ move.ravel()) / rows.compliance)
+    pull = jacobian.T @ ((rows.target_mm - jacobian @ move.ravel()) / rows.compliance)
     balance = solid.matrix @ move[solid.free] - pull.reshape(-1, 3)[solid.free]
     assert np.abs(balance).max() < 1e-8
-    near = solver.near_moves(rows, forces, vertices.ravel())
+    near = solver.displacements_at(vertices.ravel(), rows, forces)
     np.testing.assert_allclose(near, move[vertices.ravel()], atol=1e-9)
 
 
 def test_a_one_sided_row_never_pulls():
     solid = integrator()
     vertex = solid.free[len(solid.free) // 2]
-    rows = Rows(
+    rows = LinearConstraints(
         np.array([[vertex], [vertex]]), np.ones((2, 1)), np.array([[0, 1.0, 0], [1.0, 0, 0]]),
         np.array([-0.4, 0.3]), np.zeros(2), np.ones(2, dtype=bool),
     )  # fmt: skip
     solver = ConstraintSolver(solid, np.array([vertex]))
-    moved = solver.near_moves(rows, solver.multipliers(rows), np.array([vertex]))[0]
+    moved = solver.displacements_at(np.array([vertex]), rows, solver.forces(rows))[0]
     np.testing.assert_allclose(moved, [0.3, 0.0, 0.0], atol=1e-6)
 
 
 def test_contours_go_to_their_lines_and_depth_stays():
     before = lip_patch.vertices_at(0.6, 0.0)
-    image = image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
-    after = fitted(before[None], image)[0]
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)])
+    after = fitted(before[None], image, CONTOURS)[0]
     assert distance_px(before, image).max() > 2.0
     assert distance_px(after, image).max() < 0.1
     moved = after - before
@@ -133,7 +139,8 @@ def test_contours_go_to_their_lines_and_depth_stays():
 
 def test_gradients_across_the_image_stay():
     before = lip_patch.vertices_at(0.6, 0.0)
-    moved = fitted(before[None], image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS))[0] - before
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)])
+    moved = fitted(before[None], image, CONTOURS)[0] - before
     edges = FACE.triangles[MASK]
     change = np.abs(moved[edges[:, 1:]] - moved[edges[:, :1]]).mean(axis=(0, 1))
     assert change[:2].min() > 0.01
@@ -142,20 +149,19 @@ def test_gradients_across_the_image_stay():
 
 def test_points_that_were_not_found_do_not_pull():
     before = lip_patch.vertices_at(0.6, 0.0)
-    image = image_of([lip_patch.vertices_at(1.8, 0.08)], CONTOURS)
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)])
     nothing = np.zeros_like(image.outer_found)
     blind = replace(image, outer_found=nothing, inner_found=nothing)
-    np.testing.assert_allclose(fitted(before[None], blind)[0], before, atol=1e-12)
+    np.testing.assert_allclose(fitted(before[None], blind, CONTOURS)[0], before, atol=1e-12)
 
 
 def test_switched_off_the_result_is_that_of_the_paper():
     before = lip_patch.vertices_at(0.6, 0.0)[None]
     layers = np.random.default_rng(1).normal(scale=0.02, size=(1, len(MASK), 9))
-    pose = np.eye(3)[None], np.zeros((1, 3))
-    arguments = MASK, layers, before, FACE.triangles, FACE.neutral_mm, *pose
-    paper = correct_with_layers(*arguments)
-    off = correct_with_layers(*arguments, image=image_of(before, OFF))
-    on = correct_with_layers(*arguments, image=image_of(before, CONTOURS))
+    take, settings = take_of(before, image_of(before)), CorrectionSettings(16.0, 0.0, 0, None)
+    paper = correct_with_layers(MASK, layers, None, take, settings)
+    off = correct_with_layers(MASK, layers, None, take, replace(settings, image=OFF))
+    on = correct_with_layers(MASK, layers, None, take, replace(settings, image=CONTOURS))
     assert np.array_equal(off, paper)
     assert not np.allclose(on, paper)
 
@@ -165,7 +171,7 @@ def test_lips_that_pass_through_each_other_are_parted(weight):
     through = lip_patch.vertices_at(-3.0, 0.0)
     assert depth_in_other_lip(through) > 0.3
     settings = replace(OFF, contact=True, contour_weight=weight)
-    after = fitted(through[None], image_of([through], settings))[0]
+    after = fitted(through[None], image_of([through]), settings)[0]
     assert depth_in_other_lip(after) <= 0.01
 
 
@@ -174,7 +180,7 @@ def test_lips_that_touch_in_the_image_touch_in_the_mesh():
     closed, ajar = lip_patch.vertices_at(-2.35, 0.0), lip_patch.vertices_at(0.5, 0.0)
     ajar[FACE.regions["vermilion_upper"], 2] += 1.0  # and one lip before the other
     settings = replace(OFF, contact=True, contour_weight=100.0)
-    after = fitted(ajar[None], image_of([closed], settings))[0]
+    after = fitted(ajar[None], image_of([closed]), settings)[0]
     assert np.linalg.norm(ajar[gap[0]] - ajar[gap[1]]) > 2.5
     assert np.linalg.norm((after[gap[0]] - after[gap[1]])[1:]) < 0.2
     assert depth_in_other_lip(after) <= 0.01
@@ -183,10 +189,10 @@ def test_lips_that_touch_in_the_image_touch_in_the_mesh():
 def test_a_head_beside_its_image_is_laid_on_it():
     mesh = lip_patch.vertices_at(2.0, 0.1)[None]
     pose = rotation_matrix(np.array([0.0, 0.02, 0.01])), np.array([1.0, -1.5, 0.0])
-    image = image_of(mesh, REPOSE)
+    image = image_of(mesh)
     rotation, translation = pose
     coarse = (mesh - translation) @ rotation  # its eyes and brows project where they should
-    after = fitted(mesh, image, coarse=coarse, pose=pose)[0]
+    after = fitted(mesh, image, REPOSE, coarse=coarse, pose=pose)[0]
     assert distance_px(mesh[0] @ rotation.T + translation, image).mean() > 3.0
     assert distance_px(after, image).mean() < 0.2
 
@@ -205,13 +211,13 @@ def test_the_filter_over_time_has_no_lag_and_keeps_what_is_steady():
 
 
 def test_results_do_not_depend_on_the_chunk():
-    settings = ImageContourSettings(repose_frames=1.0)
+    settings = replace(DEFAULTS, repose_frames=1.0)
     rng = np.random.default_rng(2)
     shapes = np.stack([lip_patch.vertices_at(o, 0.05) for o in rng.uniform(0, 4, 16)])
-    image = image_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)), settings)
-    whole = fitted(shapes, image)
+    image = image_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)))
+    whole = fitted(shapes, image, settings)
     asked = np.array([5, 6, 7])
     near = frames_around(asked, np.arange(16), 3)
     assert near.tolist() == list(range(2, 11))
-    part = fitted(shapes[near], image[near])[np.searchsorted(near, asked)]
+    part = fitted(shapes[near], image[near], settings, frames=near)[np.searchsorted(near, asked)]
     np.testing.assert_allclose(part, whole[asked], rtol=0, atol=1e-9)

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from vermilion.config.regressors import split_name, trained_on
 from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
@@ -13,13 +14,7 @@ from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import FORMAT_VERSION, LipModel, load_model, save_model
-from vermilion.regression.training import (
-    Selection,
-    curve_table,
-    split_name,
-    train,
-    training_subjects,
-)
+from vermilion.regression.training import Selection, curve_table, train
 from vermilion.storage.errors import InputError, ModelFileError
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])
@@ -307,6 +302,6 @@ def test_names_of_regressors():
         with pytest.raises(InputError, match=r"MS, PS-<subject> or GR-<subject>"):
             split_name(wrong)
     people = ["ana", "bo", "cy"]
-    assert training_subjects("PS-bo", people) == ["bo"]
-    assert training_subjects("MS", people) == people
-    assert training_subjects("GR-bo", people) == ["ana", "cy"]
+    assert trained_on("PS-bo", people) == ["bo"]
+    assert trained_on("MS", people) == people
+    assert trained_on("GR-bo", people) == ["ana", "cy"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vermilion.correction.layers import correction_layers
-from vermilion.correction.neutral_pair import NeutralPair, acquainted
+from vermilion.correction.neutral_pair import NeutralPair, with_known_neutrals
 from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import LipModel
@@ -57,7 +57,7 @@ def pair():
 
 
 def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
-    known = acquainted(model, TRIANGLES, pair)
+    known = with_known_neutrals(model, TRIANGLES, pair)
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     np.testing.assert_allclose(layers, true, atol=1e-5)
@@ -67,10 +67,10 @@ def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
 
 
 def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
-    known = acquainted(model, TRIANGLES, pair)
+    known = with_known_neutrals(model, TRIANGLES, pair)
     features = np.random.default_rng(6).normal(size=(5, 4))
-    of_a_stranger = features - pair.features + model.neutral_features
-    difference = known.predict(features, pair.neutral_mm) - model.predict(of_a_stranger)
+    of_unseen = features - pair.features + model.neutral_features
+    difference = known.predict(features, pair.neutral_mm) - model.predict(of_unseen)
     np.testing.assert_allclose(difference, difference[:1].repeat(5, axis=0), atol=1e-5)
     for other in (None, shape(1), shape(2)):
         np.testing.assert_array_equal(
@@ -80,22 +80,22 @@ def test_the_expression_is_told_as_before_and_nobody_else_changes(model, pair):
 
 def test_what_all_their_frames_have_in_common_changes_nothing(model, pair):
     features, off = np.random.default_rng(6).normal(size=(5, 4)), np.array([0.4, -0.2, 0.8, 1.5])
-    known = acquainted(model, TRIANGLES, pair).predict(features, pair.neutral_mm)
+    known = with_known_neutrals(model, TRIANGLES, pair).predict(features, pair.neutral_mm)
     pair = replace(pair, features=pair.features + off)
-    again = acquainted(model, TRIANGLES, pair).predict(features + off, pair.neutral_mm)
+    again = with_known_neutrals(model, TRIANGLES, pair).predict(features + off, pair.neutral_mm)
     np.testing.assert_allclose(again, known, atol=1e-6)
 
 
-def test_where_h_is_absent_a_person_stays_a_stranger(model, pair):
+def test_where_h_is_absent_a_subject_stays_unseen(model, pair):
     accurate = pair.accurate_mm.copy()
     accurate[4] = np.nan  # a corner of the second triangle of the mask
-    known = acquainted(model, TRIANGLES, replace(pair, accurate_mm=accurate))
-    whole = acquainted(model, TRIANGLES, pair)
+    known = with_known_neutrals(model, TRIANGLES, replace(pair, accurate_mm=accurate))
+    whole = with_known_neutrals(model, TRIANGLES, pair)
     features = pair.features[None]
     found = known.predict(features, pair.neutral_mm)[0]
     np.testing.assert_allclose(found[0], whole.predict(features, pair.neutral_mm)[0, 0], atol=1e-6)
-    stranger = model.predict(model.neutral_features[None])
-    np.testing.assert_allclose(found[1], stranger[0, 1], atol=1e-6)
+    unseen = model.predict(model.neutral_features[None])
+    np.testing.assert_allclose(found[1], unseen[0, 1], atol=1e-6)
 
 
 def errors(model, pairs):
@@ -119,11 +119,11 @@ def of_take(pair):
 
 
 def test_of_two_neutrals_the_mean_is_right_and_features_are_the_takes(model, pair, of_take):
-    known = acquainted(model, TRIANGLES, pair, of_take)
+    known = with_known_neutrals(model, TRIANGLES, pair, of_take)
     wrong = errors(known, [pair, of_take])
     np.testing.assert_allclose(wrong.mean(axis=0), 0.0, atol=1e-5)
     assert np.abs(wrong).max() > 1e-3
-    alone = acquainted(model, TRIANGLES, None, of_take)
+    alone = with_known_neutrals(model, TRIANGLES, None, of_take)
     np.testing.assert_array_equal(known.shifts, alone.shifts)
     np.testing.assert_allclose(errors(alone, [of_take]), 0.0, atol=1e-5)
 
@@ -132,7 +132,7 @@ def test_a_person_of_the_training_is_half_known_already(model, pair, of_take):
     trained, of_rig = (
         replace(each, neutral_mm=shape(1), subject="zoe") for each in (of_take, pair)
     )
-    known = acquainted(model, TRIANGLES, of_rig, trained)
+    known = with_known_neutrals(model, TRIANGLES, of_rig, trained)
     assert sorted(known.neutrals_mm) == ["ana", "zoe"]
     shift = trained.features - model.neutral_features
     same_features = replace(model, shifts=np.array([shift, model.shifts[1]]))
@@ -147,15 +147,20 @@ def test_a_person_of_the_training_is_half_known_already(model, pair, of_take):
 def test_a_bad_neutral_of_the_take_leaves_that_of_the_person(model, pair, of_take):
     bad = replace(of_take, reason="no contour features")
     known, expected = (
-        acquainted(model, TRIANGLES, pair, other).predict(pair.features[None], pair.neutral_mm)
+        with_known_neutrals(model, TRIANGLES, pair, other).predict(
+            pair.features[None], pair.neutral_mm
+        )
         for other in (bad, None)
     )
     np.testing.assert_array_equal(known, expected)
 
 
 def test_a_bad_pair_and_a_person_of_the_training_change_nothing(model, pair):
-    assert acquainted(model, TRIANGLES, replace(pair, reason="the coarse track failed")) is model
-    assert acquainted(model, TRIANGLES, replace(pair, neutral_mm=shape(2))) is model
+    assert (
+        with_known_neutrals(model, TRIANGLES, replace(pair, reason="the coarse track failed"))
+        is model
+    )
+    assert with_known_neutrals(model, TRIANGLES, replace(pair, neutral_mm=shape(2))) is model
 
 
 def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
@@ -164,7 +169,7 @@ def test_a_regressor_with_one_bias_learns_a_person_too(model, pair):
         np.random.default_rng(1).normal(size=(40, 30)).astype(np.float32),
     )
     one = replace(model, estimator=estimator, neutrals_mm={}, shifts=np.zeros((0, 0)))
-    known = acquainted(one, TRIANGLES, pair)
+    known = with_known_neutrals(one, TRIANGLES, pair)
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     np.testing.assert_allclose(layers, true, atol=1e-5)
@@ -174,7 +179,7 @@ def test_other_features_are_refused_with_the_person_named(model, pair):
     with pytest.raises(
         InputError, match=r"subject eva, take rom.*features that are not the regressor's"
     ):
-        acquainted(model, TRIANGLES, replace(pair, feature_names=np.array(NAMES[:3])))
+        with_known_neutrals(model, TRIANGLES, replace(pair, feature_names=np.array(NAMES[:3])))
 
 
 def test_round_trip(pair, tmp_path):

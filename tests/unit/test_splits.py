@@ -16,7 +16,7 @@ from vermilion.database.read import LipDatabase
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
 from vermilion.geometry.mesh import topology_hash
-from vermilion.regression.training import Selection, train, training_subjects
+from vermilion.regression.training import Selection, train
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2]])
 NAMES = ("shape_01", "outer_width")
@@ -66,7 +66,7 @@ def test_no_regressor_trains_on_what_it_is_judged_by(sheet, tmp_path_factory):
     with LipDatabase(path) as database:
         trained = {take.subject for take in takes if take.train_frames()}
         for name in regressors_of_study(database.subjects, trained):
-            people = training_subjects(name, database.subjects)
+            people = trained_on(name, database.subjects)
             assert not trained or set(people) & trained
             wanted = {(t.name, f) for t in takes if t.subject in people for f in t.train_frames()}
             if len(wanted) < 5:
@@ -95,14 +95,14 @@ def test_a_take_held_out_whole_is_in_no_regressor(tmp_path):
         for name, expected in {
             "MS": {"ana/rom", "bo/rom"}, "PS-ana": {"ana/rom"}, "GR-ana": {"bo/rom"},
         }.items():  # fmt: skip
-            data = database.training_set(training_subjects(name, database.subjects))
+            data = database.training_set(trained_on(name, database.subjects))
             model, _ = train(name, data, *place, Selection(folds=2, clip_frames=2))
             assert set(model.training_frames) == expected
             if "bo/rom" in expected:
                 np.testing.assert_array_equal(model.training_frames["bo/rom"], [0, 1, 2, 6, 7, 8])
 
 
-def test_a_regressor_for_strangers_is_chosen_by_people_whom_it_has_not_seen(tmp_path):
+def test_a_regressor_for_unseen_subjects_is_chosen_by_such(tmp_path):
     takes = [take_of(name, "rom", "train") for name in ("ana", "bo", "cy", "di")]
     write(tmp_path / "lips.h5", takes)
     place = (NAMES, np.arange(2), np.ones(2), topology_hash(TRIANGLES), np.arange(4))
@@ -110,7 +110,7 @@ def test_a_regressor_for_strangers_is_chosen_by_people_whom_it_has_not_seen(tmp_
     with LipDatabase(tmp_path / "lips.h5") as database:
         frames = {}
         for name, people in (("MS", 4), ("GR-ana", 3), ("GR-ana-affine", 3)):
-            data = database.training_set(training_subjects(name, database.subjects))
+            data = database.training_set(trained_on(name, database.subjects))
             assert len(data.subjects) == people
             frames[name] = list(train(name, data, *place, chosen)[1].frames)
         assert len(frames["MS"]) == 5  # folds of clips
@@ -136,7 +136,7 @@ def test_a_person_is_judged_by_what_was_trained_and_by_nothing_twice(people, dat
         assert set(names) <= set(study)
         rows = [frozenset(trained_on(name, sorted(trained))) for name in names]
         for name, row in zip(names, rows, strict=True):
-            assert row == set(training_subjects(name, people)) & trained  # as training itself does
+            assert row == set(trained_on(name, people)) & trained
         if len(trained) > 1:  # with one person who trains, PS and MS are the same
             assert len(set(rows)) == len(rows)
         if subject not in trained:

@@ -13,10 +13,10 @@ from vermilion.contours.curves import (
     loop_spline,
     outward_normals,
     smoothed_halves,
-    uncrossed,
+    without_crossing,
 )
-from vermilion.contours.detector import load_detector
-from vermilion.contours.ridges import Inside, blurred_colours
+from vermilion.contours.detector_file import load_detector
+from vermilion.contours.ridges import InnerCues, blurred_colours
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders, mouth_parts
 from vermilion.evaluation.contour_error import distance_to_polyline
 
@@ -107,7 +107,7 @@ def test_what_is_nearly_black_between_lips_is_a_hole_and_no_contact(detector, da
     planes = [plane.astype(np.float32) for plane in (lightness, lightness, lip, lip)]
     curve = ellipse(CENTRE, 0.75 * WIDTH, 0.01, 80)
     points = curve[:, None] + np.array([0.0, 1.0]) * np.arange(-9, 10)[:, None]
-    contact = detector._contact(curve, points, Inside(*planes))
+    contact = detector._contact(curve, points, InnerCues(*planes))
     np.testing.assert_allclose(contact, touching, atol=0.01)
 
 
@@ -141,10 +141,10 @@ def test_a_corner_that_comes_in_is_found(detector):
 
 def test_halves_that_pass_each_other_meet():
     curve = ellipse(CENTRE, WIDTH, 10.0, 80)
-    np.testing.assert_array_equal(uncrossed(curve), curve)
+    np.testing.assert_array_equal(without_crossing(curve), curve)
     crossed = curve.copy()
     crossed[1:9, 1], crossed[:71:-1, 1] = curve[:71:-1, 1], curve[1:9, 1]
-    met = uncrossed(crossed)
+    met = without_crossing(crossed)
     np.testing.assert_allclose(met[1:9], met[:71:-1])
     np.testing.assert_array_equal(met[9:72], curve[9:72])
 

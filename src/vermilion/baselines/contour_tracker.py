@@ -19,6 +19,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from vermilion.contours.curves import smoothed_ring
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.image_contours import ImageContours
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
@@ -30,20 +32,6 @@ from vermilion.geometry.surface_points import SurfacePoints
 _ROUNDS = 8
 _LEAST_POINTS = 20
 _LEAST_MOVE_MM = 0.2
-
-
-@dataclass(frozen=True)
-class FoundContours:
-    """Contour points of some frames, samples of `lip_rings` (0 the right corner, n / 2 the left).
-
-    Attributes:
-        outer_px, inner_px: (F, n, 2); outer_found, inner_found: (F, n) bool.
-    """
-
-    outer_px: np.ndarray
-    inner_px: np.ndarray
-    outer_found: np.ndarray
-    inner_found: np.ndarray
 
 
 class ContourTracker:
@@ -69,23 +57,16 @@ class ContourTracker:
         self.outer = SurfacePoints.on_edges(ring.start, ring.end, ring.fraction, model.triangles)
         self.occluding = OccludingContour.of(model)
 
-    def track(
-        self,
-        coarse_mm: np.ndarray,
-        rotation: np.ndarray,
-        translation_mm: np.ndarray,
-        weights: np.ndarray,
-        camera: Camera,
-        found: FoundContours,
-    ) -> np.ndarray:
-        """Fitted meshes (F, V, 3), world; a frame with too few contour points stays as it is.
+    def track(self, take: CoarseTake, weights: np.ndarray) -> np.ndarray:
+        """Meshes (F, V, 3) mm, world, fitted to the contours in the take's images.
+
+        A frame with too few contour points keeps its coarse mesh.
 
         Args:
-            coarse_mm: (F, V, 3) base track, world.
-            rotation, translation_mm: (F, 3, 3), (F, 3) of `world_from_head`.
+            take: the base track with its image contours.
             weights: (F, all expressions of the model) of the base track.
         """
-        result = head_from_world(coarse_mm, rotation, translation_mm)
+        result = head_from_world(take.coarse_mm, take.rotation, take.translation_mm)
         of_shapes = len(self.displacements_mm) - len(self.expressions)
         for f in range(len(result)):
             now = np.clip(weights[f, self.expressions], 0.0, 1.0)
@@ -93,13 +74,12 @@ class ContourTracker:
                 np.concatenate([-now, np.zeros(of_shapes)]),
                 np.append(1.0 - now, np.ones(of_shapes)),
             )
-            frame = _FrameView(camera, rotation[f], translation_mm[f])
-            result[f] += np.tensordot(
-                self._fit(frame, result[f], bounds, found, f), self.displacements_mm, 1
-            )
-        return world_from_head(result, rotation, translation_mm)
+            frame = _FrameView(take.image.camera, take.rotation[f], take.translation_mm[f])
+            fitted = self._fit(frame, result[f], bounds, take.image, f)
+            result[f] += np.tensordot(fitted, self.displacements_mm, 1)
+        return world_from_head(result, take.rotation, take.translation_mm)
 
-    def _fit(self, view: _FrameView, base_mm, bounds, found: FoundContours, f: int) -> np.ndarray:
+    def _fit(self, view: _FrameView, base_mm, bounds, found: ImageContours, f: int) -> np.ndarray:
         """Weights (K,) of a frame, from the base mesh (V, 3) in the head frame."""
         weights = np.zeros(len(self.displacements_mm))
         if found.outer_found[f].sum() < _LEAST_POINTS:
@@ -155,7 +135,7 @@ class _FrameView:
     translation_mm: np.ndarray
 
     def project(self, points_mm: np.ndarray) -> np.ndarray:
-        """Head-frame points (N, 3) in pixels, (N, 2)."""
+        """`points_mm` (N, 3), head frame, in pixels (N, 2)."""
         return self.camera.project(points_mm @ self.rotation.T + self.translation_mm)
 
     def equations(self, points_mm, basis_mm, wanted_px, across) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.geometry.alignment import align_frames
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 _ROUNDS = 20
 
@@ -39,19 +39,19 @@ class LipShapes:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        save_arrays(path, {name: getattr(self, name) for name in self.__dataclass_fields__})
+        write_arrays(path, compressed=True, **vars(self))
 
     @classmethod
     def load(cls, path: str | Path) -> LipShapes:
         """Read what `save` wrote."""
-        arrays = load_arrays(path)
-        return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
+        return cls(**read_arrays(path, "file of lip shapes", cls.__dataclass_fields__))
 
     def on(self, neutral_mm: np.ndarray, triangles: np.ndarray, seam_mm: float) -> np.ndarray:
         """Displacements (S, V, 3) mm on another identity: deformation transfer (Sumner 2004).
 
         Args:
-            neutral_mm: (V, 3) of the identity, as open as the neutrals of the training.
+            neutral_mm: (V, 3) of the identity, head frame, as open as the neutrals of the training.
+            triangles: (T, 3) of it.
             seam_mm: width of the soft ring round the mask.
         """
         rest = np.broadcast_to(neutral_mm, (len(self.layers), *neutral_mm.shape))
@@ -82,7 +82,7 @@ class PosedTake:
         accurate_neutral_mm: np.ndarray,
         correspondence: Correspondence,
     ) -> PosedTake:
-        """Of H (F, V_H, 3) and its neutral (V_H, 3) in the world; frames that are not finite go."""
+        """Of H `accurate_mm` (F, V_H, 3) and `accurate_neutral_mm` (V_H, 3), world; frames not finite go."""
         neutral = correspondence.on_coarse(np.asarray(accurate_neutral_mm, dtype=np.float64))
         meshes = correspondence.on_coarse(np.asarray(accurate_mm))
         meshes = align_frames(meshes, neutral, correspondence.rigid, trim=0.2, rounds=2).apply(

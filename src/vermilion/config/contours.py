@@ -63,22 +63,7 @@ class ContourDetectorConfig(StageConfig):
         description="`boosted`: edge learning, trained on the take's labelled frames. `track`: ridges at "
         "the border of the lips' colour near the tracked lips, learnt from frames of the whole take. "
         "`landmarks`: the same near the landmarks, each frame by itself. `auto`: boosted where the take has "
-        "labelled frames in the monocular camera, with labels that lie beside the border of the lips' "
-        "colour moved there (`label_tolerance`), else track.",
-    )
-    label_tolerance: float = Field(
-        0.007,
-        ge=0,
-        le=1,
-        description="`auto`: so far from the border of the lips' colour the outer contours of a take's "
-        "labels may lie, on the mean, and count as drawn (per inter-ocular distance); 1 takes all so.",
-    )
-    label_reach: float = Field(
-        0.025,
-        gt=0,
-        le=1,
-        description="`auto`: labels that lie farther from there are named and not moved, as they or the track "
-        "are those of something else (per inter-ocular distance).",
+        "labelled frames in the monocular camera, else track.",
     )
     interocular_size_px: float = Field(
         200.0,

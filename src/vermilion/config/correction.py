@@ -97,7 +97,7 @@ class ImageAgreementConfig(StageConfig):
         le=100.0,
         description="A contour point this far beside the mesh's contour counts half, farther ones less (mm).",
     )
-    closed: float = Field(
+    closed_gap_iod: float = Field(
         0.012,
         ge=0.0,
         le=0.2,

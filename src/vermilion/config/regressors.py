@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from typing import Literal
+
+from vermilion.storage.errors import InputError
+
+Estimator = Literal["rbf", "affine", "kernel"]
+
+#: Variant of a regressor -> (estimator, features); None is the configured estimator.
+VARIANTS: dict[str, tuple[Estimator | None, str]] = {
+    "": (None, "all"),
+    "rbf": ("rbf", "all"),
+    "affine": ("affine", "all"),
+    "kernel": ("kernel", "all"),
+    "shape-only": (None, "shape"),
+    "distances-only": (None, "distances"),
+    "paper": ("rbf", "all"),
+}
 
 
 def regressors_of_study(people: Sequence[str], trained: Collection[str]) -> list[str]:
@@ -25,10 +41,37 @@ def regressors_of(subject: str, trained: Collection[str]) -> list[str]:
     return [*own, f"GR-{subject}"] if set(trained) - {subject} else own
 
 
-def trained_on(name: str, trained: Sequence[str]) -> list[str]:
-    """Whose frames a regressor of `regressors_of_study` trains on."""
-    kind, _, subject = name.partition("-")
-    return [s for s in trained if kind == "MS" or (s == subject) == (kind == "PS")]
+def split_name(regressor: str) -> tuple[str, str | None, str]:
+    """(kind, subject, variant) of a regressor's name: `MS`, `PS-anna`, `GR-anna-affine`, ...
+
+    Raises:
+        InputError: any other name.
+    """
+    base, variant = regressor, ""
+    for name in filter(None, VARIANTS):
+        if regressor.endswith(f"-{name}"):
+            base, variant = regressor.removesuffix(f"-{name}"), name
+    kind, dash, subject = base.partition("-")
+    if (kind == "MS" and not dash) or (kind in ("PS", "GR") and subject):
+        return kind, subject or None, variant
+    raise InputError(
+        f"a regressor named {regressor!r}",
+        "MS, PS-<subject> or GR-<subject>, with an optional variant "
+        + ", ".join(f"-{v}" for v in VARIANTS if v),
+        "Correct the name.",
+    )
+
+
+def trained_on(regressor: str, subjects: Sequence[str]) -> list[str]:
+    """Whose frames a regressor trains on (Lips16 section 6): one, all, or all but one subject."""
+    kind, subject, _ = split_name(regressor)
+    return [s for s in subjects if kind == "MS" or (s == subject) == (kind == "PS")]
+
+
+def measure_name(file_stem: str) -> str:
+    """Name in `measures.tsv` of a model file: `PS-s1-affine` -> `PS-s1/affine`."""
+    variant = split_name(file_stem)[2]
+    return f"{file_stem.removesuffix(f'-{variant}')}/{variant}" if variant else file_stem
 
 
 def with_variants(
@@ -58,7 +101,7 @@ def is_variant(regressor: str) -> bool:
     return regressor.partition("/")[2] not in ("", "neutral")
 
 
-def in_order(regressors) -> list[str]:
+def in_order(regressors: Iterable[str]) -> list[str]:
     """Regressors in the order of the paper's table, variants after them."""
 
     def place(name: str):

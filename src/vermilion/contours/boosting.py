@@ -62,19 +62,12 @@ class Forest:
     reject: np.ndarray
 
     def log_odds(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Log-odds of being contour at n pixels, (n,) float32."""
+        """Log-odds (n,) float32 of contour at pixels `columns`, `rows` (n,) of `integrals` (C, H, W)."""
         flat, offsets, starts = self.pool.laid_out(integrals, columns, rows)
         return _log_odds(
-            flat,
-            offsets,
-            self.pool.weights,
-            starts,
-            self.feature,
-            self.threshold,
-            self.leaf,
-            np.float32(self.prior),
-            self.reject,
-        )
+            flat, offsets, self.pool.weights, starts, self.feature, self.threshold, self.leaf,
+            np.float32(self.prior), self.reject,
+        )  # fmt: skip
 
 
 def fit_forest(
@@ -99,52 +92,37 @@ def fit_forest(
     """
     random = np.random.default_rng(settings.seed)
     mean = float(np.clip(np.average(labels, weights=weights), 1e-3, 1 - 1e-3))
-    score = np.full(len(labels), np.log(mean / (1 - mean)))
-    n_nodes = 2**settings.depth - 1
-    feature = np.zeros((settings.n_trees, n_nodes), dtype=np.int32)
-    threshold = np.full((settings.n_trees, n_nodes), np.inf, dtype=np.float32)
-    leaf = np.zeros((settings.n_trees, n_nodes + 1), dtype=np.float32)
-    reject = np.full(settings.n_trees, -np.inf, dtype=np.float32)
-    positive = labels > 0.5
-    for t in range(settings.n_trees):
+    prior = float(np.log(mean / (1 - mean)))
+    score = np.full(len(labels), prior)
+    positive, trees = labels > 0.5, []
+    for _ in range(settings.n_trees):
         probability = 1.0 / (1.0 + np.exp(-score))
         gradient = weights * (labels - probability)
         curvature = weights * np.maximum(probability * (1 - probability), 1e-6)
-        subset = np.sort(
-            random.permutation(len(pool))[: min(settings.features_per_tree, len(pool))]
-        )
+        subset = np.sort(random.permutation(len(pool))[: settings.features_per_tree])
         some = random.random(len(labels)) < settings.sample_share
         split, cut = _grow(
-            np.ascontiguousarray(codes[subset][:, some]),
-            gradient[some],
-            curvature[some],
-            settings.depth,
-            settings.l2,
-        )
+            np.ascontiguousarray(codes[subset][:, some]), gradient[some], curvature[some],
+            settings.depth, settings.l2,
+        )  # fmt: skip
         split = subset[split]
         node = _leaves(codes, split, cut)
-        feature[t] = split
-        used = cut >= 0
-        threshold[t, used] = edges[split[used], cut[used]]
-        up = np.bincount(node, gradient, n_nodes + 1)
-        down = np.bincount(node, curvature, n_nodes + 1) + settings.l2
-        leaf[t] = settings.learning_rate * up / down
-        score += leaf[t][node]
-        if positive.any():
-            reject[t] = np.quantile(score[positive], 1 - keep) - 0.5
-    used = np.unique(feature)
+        up = np.bincount(node, gradient, len(split) + 1)
+        down = np.bincount(node, curvature, len(split) + 1) + settings.l2
+        leaf = (settings.learning_rate * up / down).astype(np.float32)
+        score += leaf[node]
+        reject = np.quantile(score[positive], 1 - keep) - 0.5 if positive.any() else -np.inf
+        trees.append((split, np.where(cut >= 0, edges[split, cut], np.inf), leaf, reject))
+    feature, threshold, leaf, reject = (np.array(part) for part in zip(*trees, strict=True))
+    used, feature = np.unique(feature, return_inverse=True)
     return Forest(
-        pool.take(used),
-        np.searchsorted(used, feature).astype(np.int32),
-        threshold,
-        leaf,
-        float(np.log(mean / (1 - mean))),
-        reject,
-    )
+        pool.take(used), feature.reshape(threshold.shape).astype(np.int32),
+        threshold.astype(np.float32), leaf, prior, reject.astype(np.float32),
+    )  # fmt: skip
 
 
 def bin_edges(values: np.ndarray) -> np.ndarray:
-    """Upper edges of the quantile bins of each feature, (N, N_BINS - 1), from (N, n) values."""
+    """Upper edges (N, N_BINS - 1) of the quantile bins of each feature, from `values` (N, n)."""
     ordered = np.sort(values, axis=1)
     places = np.linspace(0, ordered.shape[1] - 1, N_BINS + 1)[1:-1]
     low = np.floor(places).astype(int)
@@ -158,7 +136,10 @@ def bin_features(
     columns: np.ndarray,
     rows: np.ndarray,
 ) -> np.ndarray:
-    """Bins of the features at n pixels, (N, n) uint8."""
+    """Bins (N, n) uint8 of the features at pixels `columns`, `rows` (n,) of `integrals` (C, H, W).
+
+    `edges` (N, N_BINS - 1) are those of `bin_edges`.
+    """
     flat, offsets, starts = pool.laid_out(integrals, columns, rows)
     return _bin_features(flat, offsets, pool.weights, starts, edges)
 

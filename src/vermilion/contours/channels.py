@@ -24,7 +24,7 @@ CHANNELS = (
 
 
 def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
-    """Channels of a region (h, w, 3) linear RGB: (C, h, w) float32 in [0, 1], as `CHANNELS`.
+    """`CHANNELS` (C, h, w) float32 in [0, 1] of a region `linear_rgb` (h, w, 3).
 
     The region's exposure is normalised first (its median lightness becomes middle grey), so that
     flicker does not matter.
@@ -47,7 +47,7 @@ def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
 
 
 def oriented_gradient(smooth: np.ndarray, sigma: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Scale-normalised gradient magnitude (h, w), and its share in each orientation modulo pi."""
+    """Scale-normalised gradient of `smooth` (h, w): magnitude (h, w), and its share in each orientation."""
     gx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125 * sigma)
     gy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125 * sigma)
     magnitude = np.sqrt(gx * gx + gy * gy)

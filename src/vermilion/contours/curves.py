@@ -14,7 +14,7 @@ CURVE_POINTS = 240
 
 
 def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray:
-    """Closed curve through a loop of landmarks (n, 2), (n_points, 2); sharp at the mouth corners.
+    """Closed curve (n_points, 2) through landmarks `loop_px` (n, 2); sharp at the mouth corners.
 
     The first point and the one farthest from it (the other corner, as the 66-point scheme has
     them) are where the upper and the lower half meet.
@@ -48,7 +48,7 @@ def smoothed_halves(ring: np.ndarray, passes: int) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def uncrossed(curve: np.ndarray) -> np.ndarray:
+def without_crossing(curve: np.ndarray) -> np.ndarray:
     """A mouth's curve (n, 2), its corners samples 0 and n / 2; halves that pass each other meet instead."""
     half, curve = len(curve) // 2, curve.copy()
     upper, lower = curve[1:half], curve[:half:-1]
@@ -58,7 +58,7 @@ def uncrossed(curve: np.ndarray) -> np.ndarray:
     return curve
 
 
-def gap(curve: np.ndarray) -> np.ndarray:
+def distance_across(curve: np.ndarray) -> np.ndarray:
     """Distance (n,) of each point of a closed curve to the half that it does not belong to."""
     half = len(curve) // 2
     parts = curve[: half + 1], np.concatenate([curve[half:], curve[:1]])
@@ -81,8 +81,8 @@ def outward_normals(curve: np.ndarray) -> np.ndarray:
     return normal if area > 0 else -normal
 
 
-def drawn(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Inside of a closed curve (size, size) bool, and the distance to it to a pixel."""
+def inside_and_distance(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """InnerCues of a closed curve (size, size) bool, and the distance to it to a pixel."""
     away = np.ones((size, size), dtype=np.uint8)
     cv2.polylines(away, [np.rint(curve - 0.5).astype(np.int32)], True, 0)
     distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
@@ -90,7 +90,7 @@ def drawn(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def filled(curve: np.ndarray, size: int) -> np.ndarray:
-    """Inside of a closed curve (size, size) bool."""
+    """InnerCues of a closed curve (size, size) bool."""
     inside = np.zeros((size, size), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(curve - 0.5).astype(np.int32)], 1)
     return inside > 0

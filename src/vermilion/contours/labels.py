@@ -75,7 +75,7 @@ def label_paths(capture: Source, camera: str) -> dict[int, Path]:
 
 
 def distance_to(points_px: np.ndarray, size: int) -> np.ndarray:
-    """Distance of each pixel centre of a (size, size) region to dense points (n, 2), in pixels."""
+    """Distance (size, size) px of each pixel centre of a region to dense `points_px` (n, 2)."""
     from scipy.spatial import cKDTree
 
     x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
@@ -106,7 +106,7 @@ def dark_valley(
     reach_px: float,
     least_contrast: float = 0.015,
 ) -> np.ndarray:
-    """The darkest smooth line between two points of an image (h, w), (n, 2) pixels.
+    """The darkest smooth line (n, 2) px of `lightness` (h, w) between `start` and `end` (2,) px.
 
     It leaves the straight line by at most `reach_px`, and starts at `start`: lips in contact show
     a dark line from the mouth's opening towards its corner. It ends where it is no darker than

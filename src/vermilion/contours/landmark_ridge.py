@@ -14,7 +14,7 @@ import numpy as np
 from vermilion.contours.curves import filled, loop_spline
 from vermilion.contours.lip_planes import dark_lines, lip_planes
 from vermilion.contours.region import MouthRegion
-from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
+from vermilion.contours.ridges import SEARCHES, InnerCues, RidgeDetector, blurred_colours
 
 
 @dataclass(frozen=True)
@@ -24,23 +24,23 @@ class LandmarkRidgeDetector(RidgeDetector):
     kind = "landmarks"
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
-        """Name of the contour -> (size, size) likelihood of a cropped region."""
+        """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
         colours = blurred_colours(image)
         landmarks = {"inner": loop_spline(region.inner_px), "outer": loop_spline(region.outer_px)}
         reach = self.reach * self.interocular_size_px
         contact = dark_lines(colours[0])
         curves, strengths = dict(landmarks), {}
-        for once in PASSES:
-            planes = lip_planes(colours, curves, once.band, once.tolerance, once.beside)
-            curves["outer"], strengths["outer"] = self.moved(
-                curves["outer"], planes["outer"], once.outer_reach * reach, once.step_px
+        for search in SEARCHES:
+            planes = lip_planes(colours, curves, search.band, search.tolerance, search.beside)
+            curves["outer"], strengths["outer"] = self.fit_border(
+                curves["outer"], planes["outer"], search.outer_reach * reach, search.step_px
             )
             lip = filled(curves["outer"], region.size_px).astype(np.float32)
-            curves["inner"], strengths["inner"] = self.moved(
-                curves["inner"] if once.inner_reach < 1 else landmarks["inner"],
+            curves["inner"], strengths["inner"] = self.fit_border(
+                curves["inner"] if search.inner_reach < 1 else landmarks["inner"],
                 planes["inner"],
-                once.inner_reach * reach,
-                once.step_px,
-                Inside(colours[0], contact, planes["flesh"], lip),
+                search.inner_reach * reach,
+                search.step_px,
+                InnerCues(colours[0], contact, planes["flesh"], lip),
             )
         return {name: self.ridge(curves[name], strengths[name], region) for name in curves}

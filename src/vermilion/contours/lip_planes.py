@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.contours.curves import drawn
+from vermilion.contours.curves import inside_and_distance
 from vermilion.contours.gums import flesh_plane
 from vermilion.contours.region import SIDE
 
@@ -13,7 +13,7 @@ LINE_PX = (0.7, 1.2)  # of the dark line where lips touch: as fine as the shade 
 #: Just beside a border: from where to where colours count as lip's and as skin's (per inter-ocular distance).
 BESIDE = (0.01, 0.04)
 LEAST_SAMPLES = 20  # pixels that tell a colour
-LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips are not surrounded by strangers
+LEAST_SPREAD = 0.01  # of the lips' colour: evenly coloured lips would make all else an outlier
 
 
 def lip_planes(
@@ -26,14 +26,14 @@ def lip_planes(
     """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
 
     `outer`: probability of lip against skin, of two normal distributions with one covariance
-    (linear discriminant) in the colour channels (3, size, size). `inner`: how far the colour is from
+    (linear discriminant) in the channels `colours` (3, size, size). `inner`: how far the colour is from
     the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
     What is lip, the `curves` (n, 2) of both contours and the band of the pass say; `beside`: for
     `outer`, what lies just beside its curve, as lips pale towards their border.
     """
     size = colours.shape[1]
-    inside, to_outer = drawn(curves["outer"], size)
-    opening, to_inner = drawn(curves["inner"], size)
+    inside, to_outer = inside_and_distance(curves["outer"], size)
+    opening, to_inner = inside_and_distance(curves["inner"], size)
     ratio = to_outer / np.maximum(to_outer + to_inner, 1e-9)
     lip = inside & ~opening & (ratio > band[0]) & (ratio < band[1])
     scale = size / SIDE
@@ -67,7 +67,7 @@ def _probability(colours: np.ndarray, lip: np.ndarray, skin: np.ndarray) -> np.n
 
 
 def dark_lines(lightness: np.ndarray) -> np.ndarray:
-    """How much darker a place (size, size) is than what lies beside it; zero where it is not."""
+    """How much darker a place of `lightness` (size, size) is than what lies beside it; else zero."""
     blurred = ((scale, cv2.GaussianBlur(lightness, (0, 0), scale)) for scale in LINE_PX)
     found = [scale**2 * cv2.Laplacian(plane, cv2.CV_32F) for scale, plane in blurred]
     return np.maximum(np.maximum(*found), 0.0)

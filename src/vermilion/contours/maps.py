@@ -50,10 +50,10 @@ def frame_maps(
     least_peak: float,
     lips_px: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[tuple[np.ndarray, np.ndarray] | None, np.ndarray | None, QualityRow]:
-    """Maps of one frame: ((inner, outer) or None, the image or None, what is to be said of it).
+    """Maps (h, w) of one frame: ((inner, outer) or None, the image or None, its quality row).
 
-    A frame that cannot be read, or has no face, has no maps and an invalid row. `lips_px`: rings
-    (n, 2), outer and inner, of the tracked lips, for a detector that starts from them.
+    A frame that cannot be read, or has no face, has no maps and an invalid row. `landmarks_px` (66, 2);
+    `lips_px`: rings (n, 2), outer and inner, of the tracked lips, for a detector that starts from them.
     """
     try:
         image = source.read(camera, frame)
@@ -76,7 +76,7 @@ def frame_maps(
 
 
 def peak(likelihood: np.ndarray) -> float:
-    """Likelihood that the strongest 200 pixels of a map exceed, as a single speck does not count."""
+    """What the 200 strongest pixels of a map `likelihood` (h, w) exceed: a single speck does not count."""
     values = np.partition(likelihood.ravel(), -200)
     return float(values[-200])
 
@@ -92,6 +92,9 @@ def maps_overlay(
     """The mouth's region beside itself with the maps over it, (side, 2 side, 3) uint8.
 
     Inner contour red, outer green; contours that a person drew are yellow.
+
+    Args:
+        image: (h, w, 3) linear RGB; maps: inner and outer (h, w); landmarks_px: (66, 2).
     """
     region = mouth_region(landmarks_px, side_px / 1.1, 0.16)
     crop = to_display(region.crop(image))
@@ -109,7 +112,7 @@ def maps_overlay(
 
 
 def sheet(images: list[np.ndarray], columns: int = 3) -> np.ndarray:
-    """A contact sheet; a grey field where there are no images."""
+    """A contact sheet (H, W, 3) uint8; a grey field where there are no images."""
     if not images:
         return np.full((64, 256, 3), 90, dtype=np.uint8)
     return tile(images, columns)

@@ -28,10 +28,10 @@ def cheapest_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
 
 
 def cheapest_ring(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
-    """The same for a closed path: the last row is beside the first.
+    """Columns (n,) of the cheapest closed path: the last row is beside the first.
 
     Solved twice: freely, then with both ends tied in the middle of the free solution, where its
-    own ends have no say.
+    own ends have no say. `cost` (n, m), `smoothness` (n,) as in `cheapest_path`.
     """
     n = len(cost)
     free = cheapest_path(cost, smoothness)

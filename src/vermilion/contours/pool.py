@@ -42,14 +42,14 @@ class FeaturePool:
         return FeaturePool(self.channel[ids], self.boxes[ids], self.weights[ids])
 
     def evaluate(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Features at n pixels, (N, n) float32, from `integral_images`."""
+        """Features (N, n) float32 at pixels `columns`, `rows` (n,) of `integrals` (C, H, W)."""
         flat, offsets, starts = self.laid_out(integrals, columns, rows)
         return _evaluate(flat, offsets, self.weights, starts)
 
     def laid_out(
         self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For `box_feature`: the integral images flat, and places there.
+        """For `box_feature` at pixels `columns`, `rows` (n,): `integrals` (C, H, W) flat, and places there.
 
         Of the corners of each feature's boxes from the pixel, (N, 4, 4): bottom right, top right,
         bottom left, top left; and of n pixels in the first channel, (n,). One sum a corner then.

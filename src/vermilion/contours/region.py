@@ -33,6 +33,7 @@ class MouthRegion:
 
     @property
     def region_from_image(self) -> np.ndarray:
+        """(2, 3) image pixels to region pixels."""
         return cv2.invertAffineTransform(self.image_from_region)
 
     @property
@@ -41,11 +42,11 @@ class MouthRegion:
         return float(np.sqrt(np.abs(np.linalg.det(self.image_from_region[:, :2]))))
 
     def to_region(self, points_px: np.ndarray) -> np.ndarray:
-        """Image pixels (N, 2) in the region."""
+        """Image pixels `points_px` (N, 2) in the region, (N, 2)."""
         return apply_affine(self.region_from_image, points_px)
 
     def to_image(self, points_px: np.ndarray) -> np.ndarray:
-        """Region pixels (N, 2) in the image."""
+        """Region pixels `points_px` (N, 2) in the image, (N, 2)."""
         return apply_affine(self.image_from_region, points_px)
 
     def crop(self, image: np.ndarray) -> np.ndarray:
@@ -74,7 +75,7 @@ class MouthRegion:
         return low, high
 
     def paste(self, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-        """Values (size, size) of the region in an image of `shape`, zero elsewhere."""
+        """`values` (size, size) of the region in an image (h, w) of `shape`, zero elsewhere."""
         return cv2.warpAffine(
             np.ascontiguousarray(values, dtype=np.float32),
             centred(self.region_from_image),
@@ -121,7 +122,7 @@ def mouth_region(
 
 
 def usable(landmarks_px: np.ndarray, shape: tuple[int, ...]) -> str:
-    """Why landmarks (66, 2) cannot place a mouth in an image of `shape`; empty if they can."""
+    """Why `landmarks_px` (66, 2) cannot place a mouth in an image of `shape`; empty if they can."""
     if not np.isfinite(landmarks_px).all():
         return "no landmarks"
     if interocular_px(landmarks_px) < 16:
@@ -133,12 +134,12 @@ def usable(landmarks_px: np.ndarray, shape: tuple[int, ...]) -> str:
 
 
 def apply_affine(affine: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (..., 2) through a (2, 3) affine map."""
+    """`points` (..., 2) through an `affine` map (2, 3)."""
     return np.asarray(points, dtype=np.float64) @ affine[:, :2].T + affine[:, 2]
 
 
 def centred(affine: np.ndarray) -> np.ndarray:
-    """The same map for OpenCV, whose pixel centres are whole numbers."""
+    """The map `affine` (2, 3) for OpenCV, whose pixel centres are whole numbers, (2, 3)."""
     shifted = affine.copy()
     shifted[:, 2] += affine[:, :2] @ [0.5, 0.5] - [0.5, 0.5]
     return shifted

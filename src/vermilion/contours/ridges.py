@@ -7,7 +7,6 @@ is drawn about it. What is lip-coloured is learnt in each frame by itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Self
 
 import cv2
@@ -15,8 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.channels import image_channels
-from vermilion.contours.curves import gap, outward_normals, sampled, smoothed_ring
-from vermilion.contours.detector import FORMAT_VERSION, ContourDetector, save_arrays
+from vermilion.contours.curves import distance_across, outward_normals, sampled, smoothed_ring
+from vermilion.contours.detector import ContourDetector
 from vermilion.contours.gums import creases
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion
@@ -29,7 +28,7 @@ LINE_SHARE = 0.7  # what the dark line counts there, against the fall
 
 
 @dataclass(frozen=True)
-class Pass:
+class Search:
     """One search for the borders.
 
     Attributes:
@@ -54,15 +53,15 @@ class Pass:
 #: gums are taken for one. Then all up to the dark of the opening, but
 #: strictly, as gums and tongue are nearly lip-coloured. Last leniently, so that the lips' own shade
 #: beside the opening does not count as opening, close to the borders that are known by then.
-PASSES = (
-    Pass((0.3, 0.7), 18.0, 1.5, 1.0, 0.5),
-    Pass((0.5, 0.95), 18.0, 1.0, 1.0, 0.5),
-    Pass((0.5, 0.95), 50.0, 0.3, 0.3, 0.25, beside=True),
+SEARCHES = (
+    Search((0.3, 0.7), 18.0, 1.5, 1.0, 0.5),
+    Search((0.5, 0.95), 18.0, 1.0, 1.0, 0.5),
+    Search((0.5, 0.95), 50.0, 0.3, 0.3, 0.25, beside=True),
 )
 
 
 @dataclass(frozen=True)
-class Inside:
+class InnerCues:
     """What else tells the inner border: (size, size) planes.
 
     Attributes:
@@ -80,7 +79,7 @@ class Inside:
 
 @dataclass(frozen=True)
 class RidgeDetector(ContourDetector):
-    """What the detectors share that draw ridges.
+    """What detectors share that draw ridges about borders.
 
     Attributes:
         interocular_size_px: inter-ocular distance of the region that is looked at.
@@ -99,17 +98,25 @@ class RidgeDetector(ContourDetector):
     edge_weight: float = 4.0
     stiffness: float = 6.0
 
-    def moved(
+    def fit_border(
         self,
         curve: np.ndarray,
         plane: np.ndarray,
         reach_px: float,
         step_px: float,
-        inside: Inside | None = None,
+        inside: InnerCues | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The curve on the strongest fall of `plane` near it, and the fall (n,) in [0, 1].
+        """The curve moved to the strongest fall of a plane near it.
 
-        The inner one (with `inside`) also where lips touch or gums begin.
+        Args:
+            curve: (n, 2) closed, region pixels.
+            plane: (size, size), falls outwards across the border.
+            reach_px: of the search to either side, region pixels.
+            step_px: between the places of the search.
+            inside: for the inner border: it also lies where lips touch or gums begin.
+
+        Returns:
+            (n, 2) curve, and how clear its border is, (n,) in [0, 1].
         """
         normals, count = outward_normals(curve), max(int(reach_px / step_px), 1)
         places = step_px * np.arange(-count, count + 1)
@@ -126,19 +133,19 @@ class RidgeDetector(ContourDetector):
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(curve, step_px, self.stiffness))
         rows = np.arange(len(curve))
-        moved = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
-        return moved, np.minimum(fall[rows, chosen], 1.0)
+        found = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
+        return found, np.minimum(fall[rows, chosen], 1.0)
 
-    def _contact(self, curve: np.ndarray, points: np.ndarray, inside: Inside) -> np.ndarray:
+    def _contact(self, curve: np.ndarray, points: np.ndarray, inside: InnerCues) -> np.ndarray:
         """How far (n,) lips may touch at a curve (n, 2), whose normals' places are (n, T, 2)."""
-        near = np.exp(-((gap(curve) / (CONTACT * self.interocular_size_px)) ** 2))
+        near = np.exp(-((distance_across(curve) / (CONTACT * self.interocular_size_px)) ** 2))
         lightness, lip = sampled(inside.lightness, points), sampled(inside.lip, points) > 0.5
         usual = np.median(lightness[lip]) if lip.any() else 1.0
         darkest = np.where(lip, lightness, np.inf).min(axis=1) / max(usual, 1e-6)
         return near * np.clip((darkest - HOLE[0]) / (HOLE[1] - HOLE[0]), 0.0, 1.0)
 
     def _creases(
-        self, curve: np.ndarray, normals: np.ndarray, inside: Inside, step_px: float, count: int
+        self, curve: np.ndarray, normals: np.ndarray, inside: InnerCues, step_px: float, count: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """`creases` at so many steps to either side of a curve.
 
@@ -156,7 +163,7 @@ class RidgeDetector(ContourDetector):
         return crease, beyond
 
     def ridge(self, curve: np.ndarray, strength: np.ndarray, region: MouthRegion) -> np.ndarray:
-        """Likelihood (size, size) about a curve (n, 2) that is so clear (n,)."""
+        """Likelihood (size, size) about a `curve` (n, 2) px of clearness `strength` (n,) in [0, 1]."""
         dense = np.concatenate([curve + t * (np.roll(curve, -1, 0) - curve) for t in (0.0, 0.5)])
         strength = np.concatenate([strength, strength])
         rows, columns = np.nonzero(region.mask)
@@ -168,14 +175,13 @@ class RidgeDetector(ContourDetector):
         )
         return values
 
-    def save(self, path: str | Path) -> None:
-        """Write `.npz` of plain arrays, whole or not at all."""
-        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        save_arrays(path, {"format_version": FORMAT_VERSION, "kind": self.kind, **arrays})
+    def arrays(self) -> dict[str, np.ndarray | float]:
+        """All that the detector is, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
-        """Of what `save` wrote. Raises KeyError where something is missing."""
+        """Of what `arrays` gave. Raises KeyError where something is missing."""
         values = {field.name: arrays[field.name] for field in fields(cls)}
         return cls(**{k: float(v) if np.ndim(v) == 0 else v for k, v in values.items()})
 

@@ -23,12 +23,12 @@ from vermilion.contours.curves import (
     sampled,
     smoothed_halves,
     smoothed_ring,
-    uncrossed,
+    without_crossing,
 )
 from vermilion.contours.lip_planes import BESIDE, dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
-from vermilion.contours.ridges import PASSES, Inside, RidgeDetector, blurred_colours
+from vermilion.contours.ridges import SEARCHES, InnerCues, RidgeDetector, blurred_colours
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
 
@@ -67,7 +67,7 @@ class TrackRidgeDetector(RidgeDetector):
     inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
-        """Name of the contour -> (size, size) likelihood of a cropped region."""
+        """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
         colours = blurred_colours(image)
         outer, strength = self.outer_border(colours, region)
         outer = loop_spline(outer)
@@ -85,25 +85,25 @@ class TrackRidgeDetector(RidgeDetector):
     def outer_border(
         self, colours: np.ndarray, region: MouthRegion
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Outer border (n, 2) of a frame and how clear it is (n,), near the take's."""
+        """Outer border (n, 2) px near the take's, and how clear it is (n,), in `colours` (3, size, size)."""
         ring, size = smoothed_halves(region.outer_px, EDGE_PASSES), self.interocular_size_px
         count = max(int(1.5 * self.frame_reach * size / STEP_PX), 1)
         places = STEP_PX * np.arange(-count, count + 1)
         normals = outward_normals(ring)
-        start = self.outer_offset * size + self.moved_parts(colours, ring)
+        start = self.outer_offset * size + self.part_offsets(colours, ring)
         seen = unwrapped(colours, ring, start[:, None] + places)
-        fall = scaled(falls(seen[None], self.direction, self.middle)[0])
+        fall = normalised_strength(edge_strength(seen[None], self.direction, self.middle)[0])
         cost = (places / (self.frame_reach * size)) ** 2 - self.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(ring, STEP_PX, self.stiffness))
         offset = smoothed_ring(start + places[chosen], 2)
         return ring + offset[:, None] * normals, fall[np.arange(len(ring)), chosen]
 
-    def moved_parts(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
-        """How far (n,) px each lip and each corner as a whole lies from the take's border in a frame.
+    def part_offsets(self, colours: np.ndarray, ring: np.ndarray) -> np.ndarray:
+        """How far (n,) px each lip and corner as a whole lies from the take's border in a frame.
 
         Rolls and presses hide a good part of a lip, and corners come in as a mouth opens wide, which
         a track does not follow: farther than a border may be looked for place by place without
-        taking another edge for it.
+        taking another edge for it. `colours` (3, size, size); `ring` (n, 2) px, region.
         """
         size = self.interocular_size_px
         reach = self.lip_reach * size
@@ -113,9 +113,11 @@ class TrackRidgeDetector(RidgeDetector):
         result = np.zeros(len(ring))
         for part in mouth_parts(len(ring)):
             along = (offset + result)[:, None] + part[:, None] * places
-            fall = falls(unwrapped(colours, ring, along)[None], self.direction, self.middle)[0]
+            fall = edge_strength(
+                unwrapped(colours, ring, along)[None], self.direction, self.middle
+            )[0]
             near = NEARLY * size / STEP_PX
-            fall = scaled(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
+            fall = normalised_strength(gaussian_filter1d(fall, near, axis=1, mode="nearest"))
             gain = self.edge_weight * np.average(fall, axis=0, weights=part)
             result += part * places[np.argmax(gain - (places / reach) ** 2)]
         return result
@@ -123,7 +125,7 @@ class TrackRidgeDetector(RidgeDetector):
     def inner_border(
         self, colours: np.ndarray, region: MouthRegion, outer: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Inner border (m, 2) of a frame whose outer one (m, 2) is known, and how clear it is (m,)."""
+        """Inner border (m, 2) px and how clear it is (m,); `colours` (3, size, size), `outer` (m, 2) px."""
         reach = self.reach * self.interocular_size_px
         curve = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(self.inner_offset))
         curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
@@ -131,17 +133,17 @@ class TrackRidgeDetector(RidgeDetector):
         )
         lip, contact = filled(outer, region.size_px).astype(np.float32), dark_lines(colours[0])
         start, strength = curve, np.zeros(len(curve))
-        for once in PASSES:
+        for search in SEARCHES:
             curves = {"outer": outer, "inner": curve}
-            planes = lip_planes(colours, curves, once.band, once.tolerance)
-            curve, strength = self.moved(
-                curve if once.inner_reach < 1 else start,
+            planes = lip_planes(colours, curves, search.band, search.tolerance)
+            curve, strength = self.fit_border(
+                curve if search.inner_reach < 1 else start,
                 planes["inner"],
-                once.inner_reach * reach,
-                once.step_px,
-                Inside(colours[0], contact, planes["flesh"], lip),
+                search.inner_reach * reach,
+                search.step_px,
+                InnerCues(colours[0], contact, planes["flesh"], lip),
             )
-        return uncrossed(curve), strength
+        return without_crossing(curve), strength
 
 
 def mouth_parts(n: int) -> np.ndarray:
@@ -209,7 +211,7 @@ def learn_borders(
     offset = np.zeros(len(rings[0]))
     direction, middle = _discriminants(seen, places, offset, beside)
     for _ in range(ROUNDS):
-        fall = scaled(falls(seen, direction, middle).mean(axis=0)[:, within])
+        fall = normalised_strength(edge_strength(seen, direction, middle).mean(axis=0)[:, within])
         cost = (places[within] / (reach * size)) ** 2 - detector.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(rings[0], STEP_PX, detector.stiffness))
         offset = smoothed_ring(places[within][chosen], 2)
@@ -232,21 +234,26 @@ def learn_borders(
 
 
 def unwrapped(colours: np.ndarray, ring: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Colours (n, T, 3) at distances `places` (T,) or (n, T) outwards from a ring (n, 2)."""
+    """`colours` (3, h, w) at `places` (T,) or (n, T) px outwards from a `ring` (n, 2) px: (n, T, 3)."""
     places = np.broadcast_to(places, (len(ring), np.shape(places)[-1]))
     points = ring[:, None] + places[..., None] * outward_normals(ring)[:, None]
     return np.stack([sampled(plane, points) for plane in colours], axis=-1)
 
 
-def falls(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """How steeply the probability of lip falls outwards, (F, n, T) a pixel, of colours (F, n, T, 3)."""
+def edge_strength(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """How steeply the probability of lip falls outwards, (F, n, T) a pixel.
+
+    Args:
+        seen: (F, n, T, 3) colours along the normals.
+        direction, middle: (n, 3), (n,) discriminants, as of `TrackRidgeDetector`.
+    """
     log_odds = np.einsum("fntc,nc->fnt", seen, direction) - middle[None, :, None]
     lip = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))
     return np.maximum(-np.gradient(lip, STEP_PX, axis=2), 0.0)
 
 
-def scaled(fall: np.ndarray) -> np.ndarray:
-    """Falls (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
+def normalised_strength(fall: np.ndarray) -> np.ndarray:
+    """Strengths `fall` (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
     return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, fields
 
 import cv2
 import numpy as np
 
+from vermilion.contours.boosted import BoostedDetector
 from vermilion.contours.boosting import (
     BoostingSettings,
     Forest,
@@ -17,24 +17,11 @@ from vermilion.contours.boosting import (
     fit_forest,
 )
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
-from vermilion.contours.detector import BoostedDetector
-from vermilion.contours.labels import (
-    CONTOURS,
-    ContourLabel,
-    Polyline,
-    contact_lines,
-    dark_valley,
-    distance_to,
-    label_paths,
-    read_label,
-)
+from vermilion.contours.labelled_frames import LabelledFrame
+from vermilion.contours.labels import CONTOURS, Polyline, contact_lines, dark_valley, distance_to
 from vermilion.contours.pool import FeaturePool, random_pool
 from vermilion.contours.region import apply_affine, mouth_region
-from vermilion.imaging.frames import FrameSource
-from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
-from vermilion.storage.quality import QualityRow
 
 
 @dataclass(frozen=True)
@@ -70,84 +57,10 @@ class TrainingSettings:
     @classmethod
     def of(cls, section) -> TrainingSettings:
         """From a section of the configuration with the same names."""
-        trees = section.boosting
-        return cls(
-            interocular_size_px=section.interocular_size_px,
-            margin=section.margin,
-            n_features=section.features,
-            patch_px=section.patch_px,
-            label_px=section.label_px,
-            variants=section.variants,
-            far_share=section.far_share,
-            max_samples=section.max_samples,
-            hard_rounds=section.hard_rounds,
-            smoothing_px=section.smoothing_px,
-            boosting=BoostingSettings(
-                n_trees=trees.trees,
-                depth=trees.depth,
-                learning_rate=trees.learning_rate,
-                features_per_tree=trees.features_per_tree,
-                sample_share=trees.sample_share,
-                l2=trees.l2,
-                seed=section.seed,
-            ),
-        )
-
-
-@dataclass(frozen=True)
-class LabelledFrame:
-    """An image (h, w, 3) linear RGB, its landmarks (66, 2), the contours drawn on it, its number."""
-
-    linear_rgb: np.ndarray
-    landmarks_px: np.ndarray
-    label: ContourLabel
-    number: int
-
-
-def read_labelled(
-    capture: str | Path,
-    camera: str,
-    source: FrameSource,
-    landmarks: LandmarkTrack,
-    required: bool,
-    **place,
-) -> tuple[list[LabelledFrame], list[QualityRow]]:
-    """The labelled frames of a take's monocular camera that serve, and why others of the take do not.
-
-    Args:
-        capture: the capture folder, with `labels/contours/<camera>/`.
-        camera: whose labels count.
-        source: the images (inpainted, where the lips wear a tattoo).
-        landmarks: of the whole take.
-        required: raise InputError where there are none.
-        place: subject and take, for messages.
-    """
-    labelled, left_out = [], []
-    for frame, path in label_paths(capture, camera).items():
-        index = np.flatnonzero(landmarks.frames == frame)
-        if len(index) == 0:  # of another take of the capture
-            continue
-        if not landmarks.valid[index[0]]:
-            left_out.append(QualityRow(frame, reason="label left out: no landmarks"))
-            continue
-        drawn = read_label(path, camera=camera, frame=frame, **place)
-        try:
-            image = source.read(camera, frame)
-        except InputError as error:
-            left_out.append(QualityRow(frame, reason=f"label left out: unreadable: {error}"))
-            continue
-        points = landmarks.points_px[index[0]]
-        labelled.append(LabelledFrame(image, points, drawn, frame))
-    if required and not labelled:
-        raise InputError(
-            "no usable contour labels",
-            f"some frames of camera {camera} in labels/contours/{camera}/",
-            "Label a few frames, or set contours.detector.kind to auto or landmarks.",
-            path=capture,
-            camera=camera,
-            **place,
-        )
-    return labelled, left_out
+        given = {f.name: getattr(section, f.name, None) for f in fields(cls)}
+        trees = section.boosting.model_dump()
+        boosting = BoostingSettings(n_trees=trees.pop("trees"), seed=section.seed, **trees)
+        return cls(**given | {"n_features": section.features, "boosting": boosting})
 
 
 @dataclass(frozen=True)
@@ -164,7 +77,13 @@ def train_detector(
 ) -> BoostedDetector:
     """Train the inner and the outer detector, separately, on labelled frames of one illumination.
 
-    Raises ValueError without frames.
+    Args:
+        frames: labelled ones.
+        settings: how samples are drawn and trees grown.
+        seed: of the samples and features.
+
+    Raises:
+        ValueError: no frames.
     """
     if not frames:
         raise ValueError("contour detectors need at least one labelled frame")

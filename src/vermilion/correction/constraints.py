@@ -1,4 +1,4 @@
-"""Soft constraints on few vertices of an integrated mesh, by a low-rank update (Woodbury).
+"""Soft linear constraints on few vertices of an integrated mesh, by a low-rank update (Woodbury).
 
 The integration's energy is (x - x0)^T A (x - x0) about its solution x0, the same A for all three
 coordinates. With rows  d_i . sum_a c_ia (x - x0)_(v_ia) = r_i  of compliance s_i (the inverse of a
@@ -6,11 +6,12 @@ weight beside the mesh's stiffness), the minimum is
 
     x = x0 + A^-1 J^T l,      (S + diag(s)) l = r,      S_ij = (d_i . d_j) sum_ab c_ia G_(v_ia, v_jb) c_jb
 
-and G, the block of A^-1 at the vertices that rows may name, is made once a topology and person.
+and G, the block of A^-1 at the vertices that constraints may name, is made once a topology and person.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -20,13 +21,13 @@ from vermilion.correction.integration import LayerIntegrator
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Constraints on a frame's mesh.
+class LinearConstraints:
+    """m constraints on a frame's mesh: a weighted sum of vertices has a value along a direction.
 
     Attributes:
         vertices: (m, k) vertex ids; coefficients: (m, k).
-        directions: (m, 3) unit vectors in the mesh's frame.
-        wanted: (m,) mm along the direction.
+        directions: (m, 3) unit vectors, in the mesh's frame.
+        target_mm: (m,) along the direction.
         compliance: (m,); 0 is exact.
         one_sided: (m,) bool: met as well where the mesh moves further along the direction.
     """
@@ -34,42 +35,47 @@ class Rows:
     vertices: np.ndarray
     coefficients: np.ndarray
     directions: np.ndarray
-    wanted: np.ndarray
+    target_mm: np.ndarray
     compliance: np.ndarray
     one_sided: np.ndarray
 
     def __len__(self) -> int:
-        return len(self.wanted)
+        return len(self.target_mm)
 
-    def __add__(self, other: Rows) -> Rows:
+    def __add__(self, other: LinearConstraints) -> LinearConstraints:
         if len(self) == 0 or len(other) == 0:
             return self if len(self) else other
         width = max(self.vertices.shape[1], other.vertices.shape[1])
         pairs = [(getattr(self._padded(width), f.name), getattr(other._padded(width), f.name))
                  for f in fields(self)]  # fmt: skip
-        return Rows(*(np.concatenate(pair) for pair in pairs))
+        return LinearConstraints(*(np.concatenate(pair) for pair in pairs))
 
-    def __getitem__(self, chosen: np.ndarray) -> Rows:
-        return Rows(*(getattr(self, f.name)[chosen] for f in fields(self)))
+    def __getitem__(self, chosen: np.ndarray) -> LinearConstraints:
+        return LinearConstraints(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
-    def of_mesh(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """d . sum c v, (m,), of a mesh or of a displacement (V, 3)."""
+    def evaluate(self, vertices_mm: np.ndarray) -> np.ndarray:
+        """d . sum c v, (m,) mm, of a mesh or displacements `vertices_mm` (V, 3)."""
         points = (vertices_mm[self.vertices] * self.coefficients[..., None]).sum(axis=1)
         return (points * self.directions).sum(axis=1)
 
-    def _padded(self, width: int) -> Rows:
+    def _padded(self, width: int) -> LinearConstraints:
         spare = width - self.vertices.shape[1]
         if spare == 0:
             return self
         again = np.repeat(self.vertices[:, :1], spare, axis=1)
         vertices = np.concatenate([self.vertices, again], axis=1)
         coefficients = np.pad(self.coefficients, ((0, 0), (0, spare)))
-        return Rows(vertices, coefficients, self.directions, self.wanted, self.compliance,
+        return LinearConstraints(vertices, coefficients, self.directions, self.target_mm, self.compliance,
                     self.one_sided)  # fmt: skip
 
 
 class ConstraintSolver:
-    """Adds rows to the solutions of an integrator; `vertices` (K,) are those that rows may name."""
+    """Adds constraints to the solutions of an integrator.
+
+    Args:
+        integrator: whose factor is used.
+        vertices: (K,) ids that constraints may name.
+    """
 
     def __init__(self, integrator: LayerIntegrator, vertices: np.ndarray):
         self._integrator = integrator
@@ -85,44 +91,51 @@ class ConstraintSolver:
         self._inverse = np.zeros((len(named) + 1, len(named) + 1))
         self._inverse[:-1, :-1] = integrator.factor.solve(units)[self._named_rows]
 
-    def multipliers(self, rows: Rows) -> np.ndarray:
-        """(m,) forces l along the rows; 0 where a one-sided row would have to pull back."""
-        result = np.zeros(len(rows))
-        if len(rows) == 0:
+    def forces(self, constraints: LinearConstraints) -> np.ndarray:
+        """Forces l (m,) along the constraints; 0 where a one-sided one would have to pull back."""
+        result = np.zeros(len(constraints))
+        if len(constraints) == 0:
             return result
-        system = self.response(rows, rows) + np.diag(rows.compliance + 1e-9)
-        active = np.ones(len(rows), dtype=bool)
+        system = self.response(constraints, constraints)
+        system += np.diag(constraints.compliance + 1e-9)
+        active = np.ones(len(constraints), dtype=bool)
         for _ in range(10):
             result[:] = 0.0
-            result[active] = np.linalg.solve(system[np.ix_(active, active)], rows.wanted[active])
-            pulling = active & rows.one_sided & (result < 0)
+            result[active] = np.linalg.solve(
+                system[np.ix_(active, active)], constraints.target_mm[active]
+            )
+            pulling = active & constraints.one_sided & (result < 0)
             if not pulling.any():
                 break
             active &= ~pulling
-        return np.where(rows.one_sided, np.maximum(result, 0.0), result)
+        return np.where(constraints.one_sided, np.maximum(result, 0.0), result)
 
-    def response(self, of: Rows, to: Rows) -> np.ndarray:
+    def response(self, of: LinearConstraints, to: LinearConstraints) -> np.ndarray:
         """(m, m'): what `of` measures when each force of `to` is one."""
         inverse = self._shares(of) @ (self._shares(to) @ self._inverse).T
         return inverse * (of.directions @ to.directions.T)
 
-    def near_moves(self, rows: Rows, multipliers: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-        """Moves (n, 3) mm of some of the named vertices."""
-        force = self._shares(rows).T @ (multipliers[:, None] * rows.directions)
-        return self._inverse[self._place[vertices]] @ force
+    def displacements_at(
+        self, vertices: np.ndarray, constraints: LinearConstraints, forces: np.ndarray
+    ) -> np.ndarray:
+        """Displacements (n, 3) mm of some of the named vertices (n,), by the forces (m,)."""
+        pushes = self._shares(constraints).T @ (forces[:, None] * constraints.directions)
+        return self._inverse[self._place[vertices]] @ pushes
 
-    def moves(self, rows: list[Rows], multipliers: list[np.ndarray]) -> np.ndarray:
-        """Moves (F, N, 3) mm of the integrator's free vertices, all frames solved together."""
-        force = np.zeros((len(self._integrator.free), 3, len(rows)))
-        for f, (of_frame, strength) in enumerate(zip(rows, multipliers, strict=True)):
+    def displacements(
+        self, constraints: Sequence[LinearConstraints], forces: Sequence[np.ndarray]
+    ) -> np.ndarray:
+        """Displacements (F, N, 3) mm of the integrator's free vertices, by each frame's `forces` (m,)."""
+        right = np.zeros((len(self._integrator.free), 3, len(constraints)))
+        for f, (of_frame, strength) in enumerate(zip(constraints, forces, strict=True)):
             pushes = self._shares(of_frame).T @ (strength[:, None] * of_frame.directions)
-            force[self._named_rows, :, f] = pushes[:-1]
-        return np.moveaxis(self._integrator.factor.solve(force), 2, 0)
+            right[self._named_rows, :, f] = pushes[:-1]
+        return np.moveaxis(self._integrator.factor.solve(right), 2, 0)
 
-    def _shares(self, rows: Rows) -> sparse.csr_matrix:
-        """(m, K + 1): each row's coefficients at the named vertices."""
-        count, width = rows.vertices.shape
+    def _shares(self, constraints: LinearConstraints) -> sparse.csr_matrix:
+        """(m, K + 1): each constraint's coefficients at the named vertices."""
+        count, width = constraints.vertices.shape
         starts = np.arange(0, count * width + 1, width)
-        at = self._place[rows.vertices].ravel()
+        at = self._place[constraints.vertices].ravel()
         shape = (count, len(self._inverse))
-        return sparse.csr_matrix((rows.coefficients.ravel(), at, starts), shape=shape)
+        return sparse.csr_matrix((constraints.coefficients.ravel(), at, starts), shape=shape)

@@ -1,155 +1,157 @@
-"""Corrected meshes of a take: the interface for evaluation, application and propagation.
+"""Corrected meshes of a take: one path for evaluation, application, propagation and the oracle.
 
-    corrected = correct_sequence(model, coarse_mm, triangles, neutral_mm, rotation, translation_mm,
-                                 features, valid=valid, seam_mm=16.0, detail_mm=15.0,
-                                 smooth_frames=3)  # (F, V, 3), mm
+    corrected_mm = correct(model, take, settings)  # (F, V, 3), world
 
-`model` is what `vermilion.regression.model.load_model` reads; `coarse_mm` (F, V, 3) is the tracker's
-**C** in the world; `rotation` (F, 3, 3) and `translation_mm` (F, 3) are its `world_from_head`;
-`neutral_mm` (V, 3) is the subject's coarse neutral (`identity.npz: neutral_mm`): it sets the weights
-of the integration, and by it the regressor knows a person of its training again; `features` (F, M) are
-those of the take. With `smooth_frames` what is regressed is made coherent over time (`coherence`).
-For known layers and displacements (the oracle):
-
-    corrected = correct_with_layers(mask, layers, coarse_mm, triangles, neutral_mm, rotation,
-                                    translation_mm, valid=valid, seam_mm=16.0,
-                                    displacement_mm=displacement_mm, detail_mm=15.0)
-
-Where `valid` is False, or the features are not finite, the coarse mesh is returned as it is. To
-correct several stretches of one person, use one `Corrector`. With a `image` (`ImageContours`, of the same
-frames) the corrected heads are laid on it and their lips made to agree with it: see `image_fit`.
+A frame that is not usable (`CoarseTake.usable`) keeps its coarse mesh. The others are taken to the head
+frame, corrected there by the integration of layers, made to agree with their image, and taken back. To
+correct several stretches of one person with one factorisation, use one `Corrector`.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from vermilion.config.correction import CorrectionConfig
+from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.coherence import smoothed_over_time
-from vermilion.correction.image_agreement import ImageAgreement
-from vermilion.correction.image_contours import ImageContours
+from vermilion.correction.image_agreement import ImageAgreement, ImageAgreementSettings
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.regression.model import LipModel
 
 
-class Corrector:
-    """A regressor bound to a person's mesh: factors once, corrects any number of frames."""
+@dataclass(frozen=True)
+class CorrectionSettings:
+    """How a take is corrected.
 
-    def __init__(
-        self,
-        model: LipModel,
-        neutral_mm: np.ndarray,
-        triangles: np.ndarray,
-        seam_mm: float = 16.0,
-        detail_mm: float = 0.0,
-        smooth_frames: int = 0,
-    ):
-        model.check_topology(triangles)
-        self.model, self.neutral_mm, self.smooth_frames = model, neutral_mm, smooth_frames
-        detail_mm = detail_mm if len(model.vertices) else 0.0
-        self.integrator = LayerIntegrator(neutral_mm, triangles, model.mask, seam_mm, detail_mm)
-        layers, displacements_mm = model.basis(np.asarray(neutral_mm, dtype=np.float64))
-        self._basis = np.ascontiguousarray(layers.T, dtype=np.float32)
-        self._places = self.integrator.weighted_places(displacements_mm) if detail_mm else None
-
-    def correct(
-        self, coarse_mm: np.ndarray, features: np.ndarray, frames: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Corrected vertices (F, V, 3), float64, of coarse ones in the head frame.
-
-        `frames` (F,) are their numbers, ascending; None: they follow each other.
-        """
-        frames = np.arange(len(features)) if frames is None else frames
-        mixture = self.model.mixture(features, self.neutral_mm)
-        mixture = smoothed_over_time(mixture, frames, self.smooth_frames)
-        one = np.ones((len(mixture), 1))
-        return self.integrator.integrate_mixture(
-            coarse_mm, np.concatenate([mixture, one], axis=1), self._basis, self._places
-        )
-
-
-def correct_sequence(
-    model: LipModel,
-    coarse_mm: np.ndarray,
-    triangles: np.ndarray,
-    neutral_mm: np.ndarray,
-    rotation: np.ndarray,
-    translation_mm: np.ndarray,
-    features: np.ndarray,
-    *,
-    valid: np.ndarray | None = None,
-    seam_mm: float = 16.0,
-    detail_mm: float = 0.0,
-    smooth_frames: int = 0,
-    frames: np.ndarray | None = None,
-    image: ImageContours | None = None,
-) -> np.ndarray:
-    """Corrected vertices (F, V, 3), world, mm, float64; see the module's text.
-
-    `frames` (F,) are their numbers, ascending; None: they follow each other.
-
-    Raises ModelFileError where the mesh is not the one that the regressor was trained on.
+    Attributes:
+        seam_mm: width of the soft ring outside the mask.
+        detail_mm: detail finer than this comes from layers, the rest from displacements; 0: layers alone.
+        smooth_frames: frames to either side that the regressed layers are smoothed over; 0: none.
+        image: agreement with the image; None: none, as in the paper.
     """
-    corrector = Corrector(model, neutral_mm, triangles, seam_mm, detail_mm, smooth_frames)
-    usable = np.isfinite(features).all(axis=1) & np.isfinite(coarse_mm).all(axis=(1, 2))
-    if valid is not None:
-        usable &= valid
-    frames = np.arange(len(features)) if frames is None else np.asarray(frames)
-    head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
-    return _in_world(
-        corrector.integrator, corrector.correct(head, features[usable], frames[usable]), usable,
-        coarse_mm, neutral_mm, rotation, translation_mm, image,
-    )  # fmt: skip
+
+    seam_mm: float
+    detail_mm: float
+    smooth_frames: int
+    image: ImageAgreementSettings | None
+
+    @classmethod
+    def of(cls, section: CorrectionConfig, fps: float) -> CorrectionSettings:
+        """From the section `correction` of the configuration, for a take of `fps` frames a second."""
+        image = ImageAgreementSettings(**section.image.model_dump())
+        return cls(**section.integration.at(fps), image=image)
+
+    def as_in_the_paper(self) -> CorrectionSettings:
+        """Without the image, which Lips16 leaves to future work, each frame by itself."""
+        return replace(self, smooth_frames=0, image=None)
+
+
+def correct(model: LipModel, take: CoarseTake, settings: CorrectionSettings) -> np.ndarray:
+    """Meshes of a take corrected by a regressor.
+
+    Returns:
+        (F, V, 3) float64, world, mm; coarse where a frame is not usable.
+
+    Raises:
+        ModelFileError: the mesh is not the one that the regressor was trained on.
+    """
+    return Corrector(model, take, settings).correct(take)
 
 
 def correct_with_layers(
     mask: np.ndarray,
     layers: np.ndarray,
-    coarse_mm: np.ndarray,
-    triangles: np.ndarray,
-    neutral_mm: np.ndarray,
-    rotation: np.ndarray,
-    translation_mm: np.ndarray,
-    *,
-    valid: np.ndarray | None = None,
-    seam_mm: float = 16.0,
-    displacement_mm: np.ndarray | None = None,
-    detail_mm: float = 0.0,
-    image: ImageContours | None = None,
+    displacement_mm: np.ndarray | None,
+    take: CoarseTake,
+    settings: CorrectionSettings,
 ) -> np.ndarray:
-    """As `correct_sequence`, with given layers (F, T, 9) over the triangles `mask` (T,).
+    """Meshes of a take corrected by known layers (the oracle), (F, V, 3) float64, world, mm.
 
     Args:
-        displacement_mm: (F, N, 3) of the mask's corners, needed where `detail_mm` is not 0.
+        mask: (T,) triangle ids of the layers.
+        layers: (F, T, 9), head frame.
+        displacement_mm: (F, N, 3) of the mask's corners, head frame; needed where `detail_mm` is not 0.
+        take: its `valid` says which frames have layers.
     """
-    usable = np.isfinite(coarse_mm).all(axis=(1, 2))
-    if valid is not None:
-        usable &= valid
-    integrator = LayerIntegrator(neutral_mm, triangles, mask, seam_mm, detail_mm)
-    places = displacement_mm[usable] if detail_mm > 0 else None
-    head = head_from_world(coarse_mm[usable], rotation[usable], translation_mm[usable])
-    return _in_world(
-        integrator, integrator.integrate(head, layers[usable], places), usable, coarse_mm,
-        neutral_mm, rotation, translation_mm, image,
-    )  # fmt: skip
+    integrator = LayerIntegrator(
+        take.neutral_mm, take.triangles, mask, settings.seam_mm, settings.detail_mm
+    )
+    rows = take.usable(layers)
+    targets_mm = displacement_mm[rows] if settings.detail_mm > 0 else None
+    head_mm = integrator.integrate(_in_head(take[rows]), layers[rows], targets_mm)
+    return _in_world(take, rows, head_mm, _agreement(integrator, take, settings))
+
+
+class Corrector:
+    """A regressor bound to a person's mesh: factors once, corrects any number of frames.
+
+    Args:
+        model: the regressor.
+        take: of the person; its frames do not matter.
+        settings: how takes are corrected.
+
+    Raises:
+        ModelFileError: the mesh is not the one that the regressor was trained on.
+    """
+
+    def __init__(self, model: LipModel, take: CoarseTake, settings: CorrectionSettings):
+        model.check_topology(take.triangles)
+        detail_mm = settings.detail_mm if len(model.vertices) else 0.0
+        self.model, self.neutral_mm, self.settings = model, take.neutral_mm, settings
+        self.integrator = LayerIntegrator(
+            take.neutral_mm, take.triangles, model.mask, settings.seam_mm, detail_mm
+        )
+        layers, displacements_mm = model.basis(np.asarray(take.neutral_mm, dtype=np.float64))
+        self._basis = np.ascontiguousarray(layers.T, dtype=np.float32)
+        self._places = self.integrator.weighted_places(displacements_mm) if detail_mm else None
+        self._agreement = _agreement(self.integrator, take, settings)
+
+    def correct(self, take: CoarseTake) -> np.ndarray:
+        """Corrected meshes (F, V, 3) float64, world, mm, of a take of the same person."""
+        rows = take.usable(take.features)
+        usable = take[rows]
+        head_mm = self.correct_heads(_in_head(usable), usable.features, usable.frames)
+        return _in_world(take, rows, head_mm, self._agreement)
+
+    def correct_heads(
+        self, coarse_mm: np.ndarray, features: np.ndarray, frames: np.ndarray
+    ) -> np.ndarray:
+        """Corrected meshes (F, V, 3) float64, head frame, mm, without the image.
+
+        Args:
+            coarse_mm: (F, V, 3) head frame; features: (F, M); all finite.
+            frames: (F,) frame numbers, ascending.
+        """
+        mixture = self.model.mixture(features, self.neutral_mm)
+        mixture = smoothed_over_time(mixture, frames, self.settings.smooth_frames)
+        mixture = np.concatenate([mixture, np.ones((len(mixture), 1))], axis=1)
+        return self.integrator.integrate_mixture(coarse_mm, mixture, self._basis, self._places)
+
+
+def _agreement(
+    integrator: LayerIntegrator, take: CoarseTake, settings: CorrectionSettings
+) -> ImageAgreement | None:
+    """What makes meshes of a person agree with their images; None where nothing asks for it."""
+    if take.image is None or settings.image is None or not settings.image.used:
+        return None
+    n_samples = take.image.outer_px.shape[1]
+    return ImageAgreement(integrator, take.neutral_mm, take.image.face, n_samples, settings.image)
+
+
+def _in_head(take: CoarseTake) -> np.ndarray:
+    return head_from_world(take.coarse_mm, take.rotation, take.translation_mm)
 
 
 def _in_world(
-    integrator: LayerIntegrator,
-    head: np.ndarray,
-    usable: np.ndarray,
-    coarse_mm: np.ndarray,
-    neutral_mm: np.ndarray,
-    rotation: np.ndarray,
-    translation_mm: np.ndarray,
-    image: ImageContours | None,
+    take: CoarseTake, rows: np.ndarray, head_mm: np.ndarray, agreement: ImageAgreement | None
 ) -> np.ndarray:
-    """The coarse meshes (F, V, 3), with the corrected ones (usable frames, V, 3) of the head frame."""
-    corrected = np.array(coarse_mm, dtype=np.float64)
-    pose = rotation[usable], translation_mm[usable]
-    if image is None or not image.settings.used:
-        corrected[usable] = world_from_head(head, *pose)
+    """The coarse meshes (F, V, 3), those at `rows` (F,) bool replaced by corrected ones, head frame."""
+    corrected_mm, usable = np.array(take.coarse_mm, dtype=np.float64), take[rows]
+    if agreement is None:
+        corrected_mm[rows] = world_from_head(head_mm, usable.rotation, usable.translation_mm)
     else:
-        fit = ImageAgreement.of(integrator, neutral_mm, image)
-        corrected[usable] = fit.fit(head, corrected[usable], *pose, image[usable])
-    return corrected
+        corrected_mm[rows] = agreement.fit(head_mm, usable)
+    return corrected_mm

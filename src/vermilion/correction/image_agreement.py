@@ -1,25 +1,31 @@
 """The corrected mesh made to agree with the image: pose, contours, contact, in that order.
 
-Layers give detail, displacements the place over long ranges; where the lips lie in the image is seen,
-so it is not left to either (Lips16 section 7 names contours as constraints of the solve as future work).
+Layers give detail and displacements the position over long ranges. The image shows where the lips lie, so
+neither decides that (Lips16 section 7 names contours as constraints of the solve as future work).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vermilion.correction.constraints import ConstraintSolver, Rows
-from vermilion.correction.image_contours import ImageContours, ImageContourSettings
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
 from vermilion.correction.integration import LayerIntegrator
-from vermilion.correction.lip_constraints import LipSamples, contour_rows, parting_rows, touch_rows
+from vermilion.correction.lip_constraints import (
+    LipSamples,
+    contact_constraints,
+    contour_constraints,
+    separation_constraints,
+)
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.correction.repose import ANCHORS, moved, repose_motion, smoothed_motion
+from vermilion.correction.repose import ANCHORS, apply_motion, repose_motion, smoothed_motion
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import interocular_px
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.head_frame import world_from_head
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.landmarks.scheme import EYE_CORNERS
 
@@ -27,11 +33,45 @@ from vermilion.landmarks.scheme import EYE_CORNERS
 _LEAST_KNOWN = 0.3
 #: Rounds of parting the lips, with how much of the contours' weight.
 _ROUNDS, _CONTOURS_COUNT = 8, (1.0, 0.1, 0.01)
-_MOST_ROWS = 800
+_MOST_CONSTRAINTS = 800
+
+
+@dataclass(frozen=True)
+class ImageAgreementSettings:
+    """How the image counts; all at 0 or False: not at all, as in the paper.
+
+    Attributes:
+        repose: whether the corrected head is laid on the image again.
+        repose_frames: deviation of the symmetric filter over time of that motion, frames.
+        contour_weight: of a millimetre of contour beside the mesh's stiffness.
+        contour_robust_mm: a contour point this far off counts half.
+        closed_gap_iod: lips touch where the inner contour is lower than this, per inter-ocular distance.
+        contact: whether lips that touch in the image meet, and never pass through each other.
+    """
+
+    repose: bool
+    repose_frames: float
+    contour_weight: float
+    contour_robust_mm: float
+    closed_gap_iod: float
+    contact: bool
+
+    @property
+    def used(self) -> bool:
+        """Whether anything is asked for."""
+        return self.repose or self.contour_weight > 0 or self.contact
 
 
 class ImageAgreement:
-    """Binds the lips of a person's mesh to an integrator; build it once."""
+    """Binds the lips of a person's mesh to an integrator; build it once.
+
+    Args:
+        integrator: of the person's mesh.
+        neutral_mm: (V, 3) the person's coarse neutral, head frame.
+        face: the model that the mesh is of.
+        n_samples: of each contour.
+        settings: how the image counts.
+    """
 
     def __init__(
         self,
@@ -39,7 +79,7 @@ class ImageAgreement:
         neutral_mm: np.ndarray,
         face: FaceModel,
         n_samples: int,
-        settings: ImageContourSettings,
+        settings: ImageAgreementSettings,
     ):
         self.settings = settings
         self._samples = LipSamples.of(*lip_rings(face, n_samples), neutral_mm, face.triangles)
@@ -55,101 +95,84 @@ class ImageAgreement:
         self._lips = np.intersect1d(lips, integrator.free)
         self._solver = ConstraintSolver(integrator, np.union1d(lips, self._crossings.vertices))
 
-    @classmethod
-    def of(
-        cls, integrator: LayerIntegrator, neutral_mm: np.ndarray, image: ImageContours
-    ) -> ImageAgreement:
-        """Bound to the face and the number of samples of an image."""
-        n_samples = image.outer_px.shape[1]
-        return cls(integrator, neutral_mm, image.face, n_samples, image.settings)
-
-    def fit(
-        self,
-        corrected: np.ndarray,
-        coarse_mm: np.ndarray,
-        rotation: np.ndarray,
-        translation_mm: np.ndarray,
-        image: ImageContours,
-    ) -> np.ndarray:
-        """Meshes (F, V, 3) in the world that agree with the image.
+    def fit(self, head_mm: np.ndarray, take: CoarseTake) -> np.ndarray:
+        """Meshes that agree with their images.
 
         Args:
-            corrected: (F, V, 3) head frame, as the integrator leaves them.
-            coarse_mm: (F, V, 3) C in the world; rotation, translation_mm: its `world_from_head`.
-            image: of the same frames.
+            head_mm: (F, V, 3) corrected meshes, head frame, as the integrator leaves them.
+            take: of the same frames, with their image contours.
+
+        Returns:
+            (F, V, 3), world, mm.
         """
-        lines = image.lines()
-        unit_px = np.array([interocular_px(v[self._eyes], image.camera) for v in coarse_mm])
-        seen = [
-            self._seen(corrected[f], rotation[f], translation_mm[f], image, f)
-            for f in range(len(corrected))
-        ]
+        image, rotation, translation_mm = take.image, take.rotation, take.translation_mm
+        lines, frames = image.lines(), range(len(take))
+        unit_px = np.array([interocular_px(v[self._eyes], image.camera) for v in take.coarse_mm])
+        seen = [self._seen(head_mm[f], rotation[f], translation_mm[f], image, f) for f in frames]
         if self.settings.repose and seen:
-            rotation, translation_mm = self._reposed(
-                corrected, coarse_mm, rotation, translation_mm, image, lines, seen, unit_px
-            )
-        corrected = np.array(corrected)
-        constraints = [
+            rotation, translation_mm = self._reposed(head_mm, take, lines, seen, unit_px)
+        head_mm = np.array(head_mm)
+        found = [
             self._constrained(
-                corrected[f], rotation[f], translation_mm[f], image, f,
+                head_mm[f], rotation[f], translation_mm[f], image, f,
                 tuple(part[f] for part in lines), seen[f], float(unit_px[f]),
             )
-            for f in range(len(corrected))
+            for f in frames
         ]  # fmt: skip
-        if constraints:
-            rows, forces = zip(*constraints, strict=True)
-            corrected[:, self._free] += self._solver.moves(list(rows), list(forces))
-        return corrected @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
+        if found:
+            constraints, forces = zip(*found, strict=True)
+            head_mm[:, self._free] += self._solver.displacements(constraints, forces)
+        return world_from_head(head_mm, rotation, translation_mm)
 
-    def _reposed(self, corrected, coarse_mm, rotation, translation_mm, image, lines, seen, unit_px):
+    def _reposed(self, head_mm, take, lines, seen, unit_px):
         """`world_from_head` after the corrected heads are laid on the image."""
-        turn = np.swapaxes(rotation, 1, 2)
-        pivot = self._pivot @ turn + translation_mm
+        turn = np.swapaxes(take.rotation, 1, 2)
+        pivot = self._pivot @ turn + take.translation_mm
         samples = np.stack(
-            [s.points.sample(v, s.triangles) for s, v in zip(seen, corrected, strict=True)]
+            [s.points.sample(v, s.triangles) for s, v in zip(seen, head_mm, strict=True)]
         )
         motion = repose_motion(
-            corrected[:, self._anchors] @ turn + translation_mm[:, None],
-            image.camera.project(coarse_mm[:, self._anchors]),
-            samples @ turn + translation_mm[:, None],
-            lines, pivot, unit_px, image.camera,
+            world_from_head(head_mm[:, self._anchors], take.rotation, take.translation_mm),
+            take.image.camera.project(take.coarse_mm[:, self._anchors]),
+            world_from_head(samples, take.rotation, take.translation_mm),
+            lines, pivot, unit_px, take.image.camera,
         )  # fmt: skip
         known = lines[2].mean(axis=1) >= _LEAST_KNOWN
-        motion = smoothed_motion(motion, known, image.frames, self.settings.repose_frames)
-        origin = moved(translation_mm[:, None], pivot, motion)[:, 0]
-        return rotation_matrix(motion[:, :3]) @ rotation, origin
+        motion = smoothed_motion(motion, known, take.frames, self.settings.repose_frames)
+        origin = apply_motion(take.translation_mm[:, None], pivot, motion)[:, 0]
+        return rotation_matrix(motion[:, :3]) @ take.rotation, origin
 
     def _constrained(
         self, vertices, rotation, translation_mm, image, f, lines, seen, unit_px
-    ) -> tuple[Rows, np.ndarray]:
-        """Rows of a frame and the forces along them."""
+    ) -> tuple[LinearConstraints, np.ndarray]:
+        """Constraints of a frame and the forces along them."""
         weight, n = self.settings.contour_weight, image.inner_px.shape[1]
         place = rotation, translation_mm
         robust_mm = self.settings.contour_robust_mm
 
-        def rows_of(samples: LipSamples) -> Rows:
-            return contour_rows(
+        def on_contours(samples: LipSamples) -> LinearConstraints:
+            return contour_constraints(
                 samples, vertices, *place, image.camera, lines, weight or 1.0, robust_mm
             )
 
-        rows = rows_of(seen)
+        constraints = on_contours(seen)
         if weight > 0:  # which points form the inner contour, once more at about the result
             now = np.array(vertices)
-            moves = self._solver.near_moves(rows, self._solver.multipliers(rows), self._lips)
-            now[self._lips] += moves
-            rows = rows_of(self._seen(now, *place, image, f))
+            forces = self._solver.forces(constraints)
+            now[self._lips] += self._solver.displacements_at(self._lips, constraints, forces)
+            constraints = on_contours(self._seen(now, *place, image, f))
         else:
-            rows = rows[:0]
+            constraints = constraints[:0]
         if not self.settings.contact:
-            return rows, self._solver.multipliers(rows)
+            return constraints, self._solver.forces(constraints)
         if weight > 0:
             view = vertices[self._eyes].mean(axis=0) @ rotation.T + translation_mm
             view = (view - image.camera.centre_mm) @ rotation
-            rows += touch_rows(
+            constraints += contact_constraints(
                 self._samples, vertices, image.inner_px[f], lines[2][n:], unit_px,
-                view / np.linalg.norm(view), weight, self.settings.closed,
+                view / np.linalg.norm(view), weight, self.settings.closed_gap_iod,
             )  # fmt: skip
-        return self._parted(vertices, rows)
+        return self._separated(vertices, constraints)
 
     def _seen(self, vertices, rotation, translation_mm, image, f) -> LipSamples:
         """Samples on the contours as they are seen: of the inner one, what hides the mouth now."""
@@ -159,24 +182,26 @@ class ImageAgreement:
         )
         return self._samples.with_inner(samples, self._occluding.points[points])
 
-    def _parted(self, vertices: np.ndarray, rows: Rows) -> tuple[Rows, np.ndarray]:
-        """Rows and forces that leave no lip in the other: an active set, found again each round.
+    def _separated(
+        self, vertices: np.ndarray, constraints: LinearConstraints
+    ) -> tuple[LinearConstraints, np.ndarray]:
+        """Constraints and forces that leave no lip in the other: an active set, found again each round.
 
         Should contours press the lips together so that no set is enough, they count less and less; the
         least deep result stands where nothing helps.
         """
         ids, now, least, best = self._crossings.vertices, np.array(vertices), np.inf, None
         for counts in _CONTOURS_COUNT:
-            both = replace(rows, compliance=rows.compliance / counts)
+            both = replace(constraints, compliance=constraints.compliance / counts)
             for _ in range(_ROUNDS):
-                forces = self._solver.multipliers(both)
-                now[ids] = vertices[ids] + self._solver.near_moves(both, forces, ids)
-                through, deepest_mm = parting_rows(self._crossings, vertices, now)
+                forces = self._solver.forces(both)
+                now[ids] = vertices[ids] + self._solver.displacements_at(ids, both, forces)
+                through, deepest_mm = separation_constraints(self._crossings, vertices, now)
                 if deepest_mm < least:
                     least, best = deepest_mm, (both, forces)
                 if len(through) == 0:
                     return both, forces
                 both += through
-                if len(both) > _MOST_ROWS:
+                if len(both) > _MOST_CONSTRAINTS:
                     break
         return best

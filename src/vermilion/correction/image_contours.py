@@ -1,4 +1,4 @@
-"""What the image says of the lips: lines that the contours of a mesh must project on.
+"""Image-space lip contours: lines that the contours of a mesh must project on.
 
 A found contour point fixes the mesh along the contour's normal only: where along the contour a
 sample belongs is not seen, nor its depth.
@@ -6,7 +6,8 @@ sample belongs is not seen, nor its depth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -15,33 +16,8 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.search import inward_normals
 from vermilion.geometry.camera import Camera
 
-#: What an image takes from feature files.
+#: Arrays of the feature files that image-space contours are made of.
 IMAGE_ARRAYS = ("outer_px", "inner_px", "outer_found", "inner_found", "valid")
-
-
-@dataclass(frozen=True)
-class ImageContourSettings:
-    """How the image counts; all at 0 or False: not at all, which is the paper.
-
-    Attributes:
-        repose: whether the corrected head is laid on the image again.
-        repose_frames: deviation of the symmetric filter over time of that motion, frames.
-        contour_weight: of a millimetre of contour beside the mesh's stiffness.
-        contour_robust_mm: a contour point this far off counts half.
-        closed: lips touch where the inner contour is lower than this, per inter-ocular distance.
-        contact: whether lips that touch in the image meet, and never pass through each other.
-    """
-
-    repose: bool = True
-    repose_frames: float = 3.0
-    contour_weight: float = 1.0
-    contour_robust_mm: float = 2.5
-    closed: float = 0.012
-    contact: bool = True
-
-    @property
-    def used(self) -> bool:
-        return self.repose or self.contour_weight > 0 or self.contact
 
 
 @dataclass(frozen=True)
@@ -51,55 +27,41 @@ class ImageContours:
     Attributes:
         face: the model that the mesh is of, for its contours and landmarks.
         camera: of the images.
-        frames: (F,) frame numbers.
         outer_px, inner_px: (F, n, 2) rings of points, sample k found from sample k of the mesh.
         outer_found, inner_found: (F, n) bool.
-        settings: how all this counts.
     """
 
     face: FaceModel
     camera: Camera
-    frames: np.ndarray
     outer_px: np.ndarray
     inner_px: np.ndarray
     outer_found: np.ndarray
     inner_found: np.ndarray
-    settings: ImageContourSettings = field(default_factory=ImageContourSettings)
 
     @classmethod
     def of(
-        cls,
-        face: FaceModel,
-        camera: Camera,
-        frames: np.ndarray,
-        features: dict[str, np.ndarray],
-        settings: ImageContourSettings,
+        cls, face: FaceModel, camera: Camera, measured: Mapping[str, np.ndarray]
     ) -> ImageContours:
-        """Of the arrays `IMAGE_ARRAYS` of feature files; in a frame that is not valid nothing is found."""
-        valid = features["valid"][:, None]
-        return cls(
-            face, camera, np.asarray(frames), features["outer_px"], features["inner_px"],
-            features["outer_found"] & valid, features["inner_found"] & valid, settings,
-        )  # fmt: skip
+        """From `measured`, IMAGE_ARRAYS: rings (F, n, 2) px, found (F, n) and valid (F,) bool.
 
-    def __getitem__(self, chosen: np.ndarray) -> ImageContours:
+        In a frame that is not valid nothing counts as found.
+        """
+        valid = measured["valid"][:, None]
+        outer_found, inner_found = measured["outer_found"] & valid, measured["inner_found"] & valid
+        return cls(
+            face, camera, measured["outer_px"], measured["inner_px"], outer_found, inner_found
+        )
+
+    def __getitem__(self, rows: np.ndarray | slice) -> ImageContours:
         """The same of some frames, by rows or (F,) bool."""
-        names = ("frames", "outer_px", "inner_px", "outer_found", "inner_found")
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        names = (f.name for f in fields(self) if f.name not in ("face", "camera"))
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
     def lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(points (F, 2n, 2) px, unit normals (F, 2n, 2), known (F, 2n) bool), outer ring first."""
-        outer, inner = (
-            _ring_lines(*ring)
-            for ring in ((self.outer_px, self.outer_found), (self.inner_px, self.inner_found))
-        )
+        outer = _ring_lines(self.outer_px, self.outer_found)
+        inner = _ring_lines(self.inner_px, self.inner_found)
         return tuple(np.concatenate(parts, axis=1) for parts in zip(outer, inner, strict=True))
-
-
-def frames_around(frames: np.ndarray, known: np.ndarray, reach: int) -> np.ndarray:
-    """Those of the `known` frame numbers that lie within `reach` of one of `frames`, ascending."""
-    apart = np.abs(np.subtract.outer(np.sort(known), np.asarray(frames)))
-    return np.sort(known)[apart.min(axis=1) <= reach]
 
 
 def _ring_lines(

@@ -152,7 +152,7 @@ class LayerIntegrator:
         return self._corrected(coarse, add_to, basis.dtype)
 
     def weighted_places(self, displacements_mm: np.ndarray) -> np.ndarray:
-        """(N' * 3, R): displacements (R, N * 3) of the mask's corners as the system weighs them."""
+        """(N' * 3, R) of `displacements_mm` (R, N * 3) of the mask's corners, as the system weighs them."""
         chosen = displacements_mm.reshape(len(displacements_mm), -1, 3)[:, self.places]
         weighted = chosen * self.place_weight[:, None]
         return np.ascontiguousarray(weighted.reshape(len(chosen), -1).T, dtype=np.float32)

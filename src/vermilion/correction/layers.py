@@ -19,7 +19,7 @@ _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 
 
 def encode_gradients(gradients: np.ndarray) -> np.ndarray:
-    """Nine numbers, (..., 9) float64, of deformation gradients (..., 3, 3)."""
+    """Nine numbers (..., 9) float64 of deformation `gradients` (..., 3, 3)."""
     rotations, stretches = polar_decomposition(gradients)
     layers = np.empty((*gradients.shape[:-2], 9))
     layers[..., :3] = rotation_vector(rotations)
@@ -29,7 +29,7 @@ def encode_gradients(gradients: np.ndarray) -> np.ndarray:
 
 
 def decode_layers(layers: np.ndarray) -> np.ndarray:
-    """Deformation gradients, (..., 3, 3) float64, of nine numbers (..., 9): the exact inverse."""
+    """Deformation gradients (..., 3, 3) float64 of `layers` (..., 9): the exact inverse."""
     layers = np.asarray(layers, dtype=np.float64)
     if layers.shape[-1] != 9:
         raise ValueError(f"layers must be (..., 9), got {layers.shape}")
@@ -54,7 +54,7 @@ def correction_layers(
 
 
 def polar_decomposition(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """G = Q S with Q a rotation and S symmetric, both (..., 3, 3) float64.
+    """G = Q S of `matrices` G (..., 3, 3): Q a rotation, S symmetric, both (..., 3, 3) float64.
 
     Where G turns a triangle inside out (negative determinant) or is singular, Q is the nearest
     rotation and S has a negative or zero eigenvalue; the product is G all the same.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vermilion.correction.constraints import Rows
+from vermilion.correction.constraints import LinearConstraints
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.features.rings import Ring
 from vermilion.geometry.camera import Camera
@@ -41,7 +41,7 @@ class LipSamples:
     def of(
         cls, outer: Ring, inner: Ring, neutral_mm: np.ndarray, triangles: np.ndarray
     ) -> LipSamples:
-        """Of both rings of a face (T, 3), with lengths on a person's neutral (V, 3)."""
+        """Of both rings of a face `triangles` (T, 3), with lengths on `neutral_mm` (V, 3), head frame."""
         lengths = []
         for ring in (outer, inner):
             points = ring.points(neutral_mm)
@@ -55,7 +55,7 @@ class LipSamples:
         return cls(points, triangles, np.concatenate(lengths))
 
 
-def contour_rows(
+def contour_constraints(
     samples: LipSamples,
     vertices_mm: np.ndarray,
     rotation: np.ndarray,
@@ -64,8 +64,8 @@ def contour_rows(
     lines: tuple[np.ndarray, np.ndarray, np.ndarray],
     weight: float,
     robust_mm: float,
-) -> Rows:
-    """Each sample projects on its line (point to line, depth free), linearised at the mesh.
+) -> LinearConstraints:
+    """Each sample projects on its line: point to line in the image, depth free, linearised at the mesh.
 
     Args:
         vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
@@ -79,14 +79,15 @@ def contour_rows(
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
     counts = weight * samples.length_mm / (1.0 + (off_mm / robust_mm) ** 2)
-    rows = Rows(
-        samples.points.corners(samples.triangles), samples.points.barycentric, across / px_per_mm[:, None], off_mm,
+    made = LinearConstraints(
+        samples.points.corners(samples.triangles), samples.points.barycentric,
+        across / px_per_mm[:, None], off_mm,
         1.0 / counts, np.zeros(len(off_mm), dtype=bool),
     )  # fmt: skip
-    return rows[known & np.isfinite(off_mm)]
+    return made[known & np.isfinite(off_mm)]
 
 
-def touch_rows(
+def contact_constraints(
     samples: LipSamples,
     vertices_mm: np.ndarray,
     inner_px: np.ndarray,
@@ -94,8 +95,8 @@ def touch_rows(
     unit_px: float,
     view: np.ndarray,
     weight: float,
-    closed: float,
-) -> Rows:
+    closed_gap_iod: float,
+) -> LinearConstraints:
     """Where the inner contour is closed in the image, its upper and lower samples meet.
 
     Args:
@@ -105,13 +106,13 @@ def touch_rows(
         view: (3,) unit direction of the view in the head frame: it and the vertical are held, along
             the mouth the lips slide.
         weight: of a millimetre of contour.
-        closed: height of the inner contour per inter-ocular distance, under which it is closed.
+        closed_gap_iod: height of the inner contour, under which it is closed, per inter-ocular distance.
     """
     n = len(inner_px)
     upper = np.arange(1, n // 2)
     lower = n - upper
     apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
-    touching = (apart < closed) & known[upper] & known[lower]
+    touching = (apart < closed_gap_iod) & known[upper] & known[lower]
     inner = len(samples.points) - n  # where the inner ring begins
     upper, lower = inner + upper[touching], inner + lower[touching]
     above, below = samples.points[upper], samples.points[lower]
@@ -122,29 +123,29 @@ def touch_rows(
     directions = np.repeat(axes, len(upper), axis=0)
     vertices, coefficients = np.tile(vertices, (2, 1)), np.tile(coefficients, (2, 1))
     compliance = 1.0 / (weight * np.tile(samples.length_mm[upper], 2))
-    rows = Rows(vertices, coefficients, directions, np.zeros(len(vertices)), compliance,
+    made = LinearConstraints(vertices, coefficients, directions, np.zeros(len(vertices)), compliance,
                 np.zeros(len(vertices), dtype=bool))  # fmt: skip
-    rows.wanted[:] = -rows.of_mesh(vertices_mm)
-    return rows
+    made.target_mm[:] = -made.evaluate(vertices_mm)
+    return made
 
 
-def parting_rows(
+def separation_constraints(
     crossings: LipCrossings, before_mm: np.ndarray, now_mm: np.ndarray
-) -> tuple[Rows, float]:
-    """(one-sided rows that part lips which pass through each other now, greatest depth in mm).
+) -> tuple[LinearConstraints, float]:
+    """(one-sided constraints that separate lips which pass through each other now, greatest depth, mm).
 
     Args:
-        before_mm, now_mm: (V, 3); rows are for moves from before.
+        before_mm, now_mm: (V, 3) meshes of one frame; constraints are on displacements from before.
     """
     found = crossings.find(now_mm)
     deepest = found.deepest_mm
     found = found[found.depth_mm > SLACK_MM]
-    rows = Rows(
+    made = LinearConstraints(
         np.concatenate([found.inside[:, None], found.triangle], axis=1),
         np.concatenate([np.ones((len(found.inside), 1)), -found.barycentric], axis=1),
         found.normal, np.zeros(len(found.inside)), np.full(len(found.inside), 1e-5),
         np.ones(len(found.inside), dtype=bool),
     )  # fmt: skip
     # The plane's equation holds at any of its points, so it does at where the edge enters.
-    rows.wanted[:] = _APART_MM - rows.of_mesh(before_mm)
-    return rows, deepest
+    made.target_mm[:] = _APART_MM - made.evaluate(before_mm)
+    return made, deepest

@@ -43,6 +43,7 @@ class Crossings:
 
     @property
     def deepest_mm(self) -> float:
+        """Depth of the vertex that lies deepest; 0 where there is none."""
         return float(self.depth_mm.max(initial=0.0))
 
 
@@ -68,7 +69,7 @@ class LipCrossings:
         self._edges = [_both_ways(side) for side in self._triangles]
 
     def find(self, vertices_mm: np.ndarray) -> Crossings:
-        """Crossings of a mesh (V, 3); only rows `vertices` need be right."""
+        """Crossings of a mesh `vertices_mm` (V, 3), any frame; only rows `vertices` need be right."""
         lips = vertices_mm[self.vertices]
         lips = lips - lips.mean(axis=0)  # the ray caster has single precision
         upper, lower = (

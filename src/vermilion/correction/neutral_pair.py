@@ -1,10 +1,10 @@
-"""A person's neutral, as the tracker has it and as it is (Lips16 4.2, D of eq. 1).
+"""A subject's neutral, as the tracker has it and as it is (Lips16 4.2, D of eq. 1).
 
-What a regressor adds to a coarse mesh has two parts: what the tracker gets wrong of an expression,
-which people have in common, and what it gets wrong of the person, which is theirs alone: the layer
-between the two neutrals. Of people whom a regressor was trained on it knows both. Of anybody else
-one frame tells the second: the neutral from a rig. It is not quite the same in every take, as camera
-and light change what a tracker sees: a neutral frame of the take that is corrected tells that.
+What a regressor adds to a coarse mesh has two parts: the tracker's error in an expression, which people
+share, and its error in the identity, which each subject has alone: the layer between the two neutrals.
+For subjects of its training a regressor knows both. For an unseen subject, one neutral frame of a rig
+take supplies the identity. Camera and light change the tracker's error, so a neutral frame of the take
+that is corrected adds what is particular to that take.
 """
 
 from __future__ import annotations
@@ -57,25 +57,30 @@ class NeutralPair:
         return cls(**{**arrays, **texts})
 
 
-def acquainted(
+def with_known_neutrals(
     model: LipModel,
     triangles: np.ndarray,
     of_person: NeutralPair | None,
     of_take: NeutralPair | None = None,
 ) -> LipModel:
-    """The model, told how the track errs on a person, and in the take that is to be corrected.
+    """The model with the identity bias of a subject, and of the take that is to be corrected.
 
-    Features are taken from those of the neutral frame, as in the training: of the take's, else the
-    person's, as each camera and light has errors of its own. The person's bias is the mean of what is
-    known of it: that of the training, or for somebody else the one that corrects the neutral of their
-    rig to the accurate one; and the one that does so with the take's. Each errs by half a
-    millimetre and more in its own way, so that two are better than either. Outputs where H is absent
-    keep the bias that they have. The model itself where nothing is told that it did not know.
+    Features are measured from those of the neutral frame, as in the training: that of the take, else that
+    of the rig take, as each camera and light has errors of its own. The bias is the mean of all that is
+    known of it: that of the training or, for an unseen subject, the one that corrects the neutral of their
+    rig take; and the one that corrects that of the take. Each is wrong by half a millimetre and more in
+    its own way, so the mean is better than either. Outputs where H is absent keep their bias.
 
     Args:
         triangles: (T, 3) of the coarse mesh.
-        of_person: the neutral of their rig take; of no use where the model was trained on the person.
+        of_person: the neutral of their rig take; not used where the model was trained on the subject.
         of_take: that of the take to be corrected.
+
+    Returns:
+        the model itself where neither tells anything new.
+
+    Raises:
+        InputError: a pair's features are not those of the model.
     """
     given = [pair for pair in (of_person, of_take) if pair is not None and not pair.reason]
     person = model.person_of(given[0].neutral_mm) if given else None
@@ -106,9 +111,8 @@ def acquainted(
     return replace(model, estimator=estimator, neutrals_mm=neutrals, shifts=shifts)
 
 
-def neutral_pairs(inputs) -> list[NeutralPair | None]:
-    """What `acquainted` is told, from a job's inputs `neutral_pair` and `neutral_of_take`; None if absent."""
-    paths = (inputs.get(name) for name in ("neutral_pair", "neutral_of_take"))
+def load_pairs(*paths: str | Path | None) -> list[NeutralPair | None]:
+    """What `with_known_neutrals` is told: the pair of each file; None for no file."""
     return [NeutralPair.load(path) if path else None for path in paths]
 
 

@@ -57,7 +57,7 @@ def repose_motion(
     unit = unit_px[:, None]
     known = known * (_INDEPENDENT / np.maximum(known.sum(axis=1, keepdims=True), 1))
     for _ in range(_STEPS):
-        world = moved(points, pivot_mm, motion)
+        world = apply_motion(points, pivot_mm, motion)
         arm = world - (pivot_mm + motion[:, 3:])[:, None]
         slope = camera.pixel_jacobian(world) / unit[..., None, None]
         rows = np.concatenate([np.cross(arm[:, :, None], slope), slope], axis=3)
@@ -79,7 +79,7 @@ def repose_motion(
 def smoothed_motion(
     motion: np.ndarray, known: np.ndarray, frames: np.ndarray, deviation: float
 ) -> np.ndarray:
-    """Motion (F, 6) after a symmetric filter over the known frames (F,) bool; 0 without any near.
+    """`motion` (F, 6) after a symmetric filter over the `known` frames (F,) bool; 0 without any near.
 
     Args:
         frames: (F,) frame numbers; a frame that is not there does not count.
@@ -97,8 +97,8 @@ def smoothed_motion(
                      out=np.zeros_like(motion))  # fmt: skip
 
 
-def moved(points_mm: np.ndarray, pivot_mm: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """World points (F, m, 3) after the motions (F, 6) about the pivots (F, 3)."""
+def apply_motion(points_mm: np.ndarray, pivot_mm: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """World points `points_mm` (F, m, 3) after the `motion` (F, 6) about `pivot_mm` (F, 3), world."""
     turned = (points_mm - pivot_mm[:, None]) @ np.swapaxes(rotation_matrix(motion[:, :3]), 1, 2)
     return turned + (pivot_mm + motion[:, 3:])[:, None]
 

@@ -155,7 +155,7 @@ def save_layers(
 ) -> None:
     """Write frames (F,), layers (F, T, 9), displacement_mm (F, N, 3), mask (T,) and valid (F,), `.npz`.
 
-    Displacements are those of the mask's corners, ascending (`mesh_corners`).
+    Displacements are those of the corners of the `mask` (T,) of `triangles` (U, 3), ascending.
     """
     write_arrays(
         path,

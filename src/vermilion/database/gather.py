@@ -34,12 +34,13 @@ def read_take_files(
     Raises InputError where the chunks disagree about frames or features.
     """
     place = {"subject": row["subject"], "take": row["take"]}
-    layers = [
-        _load(path, ("frames", "layers", "displacement_mm", "valid"), place) for path in layer_paths
-    ]
-    features = [
-        _load(path, ("frames", "features", "names", "valid"), place) for path in feature_paths
-    ]
+    layers, features = (
+        [read_arrays(path, "part of the database", names, **place) for path in paths]
+        for paths, names in (
+            (layer_paths, ("frames", "layers", "displacement_mm", "valid")),
+            (feature_paths, ("frames", "features", "names", "valid")),
+        )
+    )
     frames = np.concatenate([part["frames"] for part in layers])
     others = np.concatenate([part["frames"] for part in features])
     if not np.array_equal(frames, others):
@@ -64,7 +65,3 @@ def read_take_files(
         train=np.isin(frames, row["train"]),
     )
     return TakeFiles(entry, tuple(str(name) for name in features[0]["names"]))
-
-
-def _load(path: str | Path, needed: Sequence[str], place: Mapping) -> dict[str, np.ndarray]:
-    return read_arrays(path, "part of the database", needed, **place)

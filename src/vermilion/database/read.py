@@ -64,6 +64,7 @@ class LipDatabase:
 
     @property
     def subjects(self) -> tuple[str, ...]:
+        """Their names, sorted."""
         return tuple(sorted({subject for subject, _ in self.takes}))
 
     def neutral_mm(self, subject: str) -> np.ndarray:
@@ -97,10 +98,8 @@ class LipDatabase:
         Raises InputError where there are fewer than `MIN_FRAMES`.
         """
         chosen = [(s, t) for s, t in self.takes if s in subjects]
-        rows = []
-        for subject, take in chosen:
-            group = self._file[f"takes/{subject}/{take}"]
-            rows.append(np.flatnonzero(group["valid"][:] & group["train"][:]))
+        groups = [self._file[f"takes/{subject}/{take}"] for subject, take in chosen]
+        rows = [np.flatnonzero(group["valid"][:] & group["train"][:]) for group in groups]
         total = sum(len(r) for r in rows)
         if total < MIN_FRAMES:
             raise InputError(
@@ -109,27 +108,25 @@ class LipDatabase:
                 "Give a take of role `tattoo` with split `train` or `test:A-B`, and look at the "
                 "quality table for frames that failed.",
             )
-        n_features, n_outputs = len(self.feature_names), len(self.mask) * 9
-        features = np.empty((total, n_features), dtype=np.float32)
-        layers = np.empty((total, n_outputs), dtype=np.float32)
-        displacements = np.empty((total, len(self.vertices) * 3), dtype=np.float32)
-        frames = np.empty(total, dtype=np.int32)
-        sequences = np.repeat(np.arange(len(chosen)), [len(r) for r in rows])
-        first = 0
-        for (subject, take), part in zip(chosen, rows, strict=True):
-            group = self._file[f"takes/{subject}/{take}"]
-            to = slice(first, first + len(part))
-            if len(part):
-                features[to] = group["features"][part]
-                layers[to] = group["layers"][part].reshape(len(part), -1)
-                displacements[to] = group["displacement_mm"][part].reshape(len(part), -1)
-                frames[to] = group["frames"][part]
-            first += len(part)
-        names = tuple(f"{s}/{t}" for s, t in chosen)
-        trained = {s for (s, _), part in zip(chosen, rows, strict=True) if len(part)}
-        neutrals = {s: self.neutral_mm(s) for s in sorted(trained)}
-        rests = {s: self.neutral_features(s) for s in sorted(trained)}
-        rests = {s: found for s, found in rests.items() if found is not None}
+
+        def gathered(name: str, width: int, dtype: type = np.float32) -> np.ndarray:
+            """(total, width) of a data set's rows, read take by take into one array."""
+            result, first = np.empty((total, width), dtype=dtype), 0
+            for group, part in zip(groups, rows, strict=True):
+                if len(part):
+                    result[first : first + len(part)] = group[name][part].reshape(len(part), -1)
+                first += len(part)
+            return result
+
+        trained = sorted({s for (s, _), part in zip(chosen, rows, strict=True) if len(part)})
+        rests = {s: self.neutral_features(s) for s in trained}
         return TrainingSet(
-            features, layers, displacements, sequences, names, frames, neutrals, rests
+            features=gathered("features", len(self.feature_names)),
+            layers=gathered("layers", 9 * len(self.mask)),
+            displacements_mm=gathered("displacement_mm", 3 * len(self.vertices)),
+            sequences=np.repeat(np.arange(len(chosen)), [len(part) for part in rows]),
+            takes=tuple(f"{s}/{t}" for s, t in chosen),
+            frames=gathered("frames", 1, np.int32)[:, 0],
+            neutrals_mm={s: self.neutral_mm(s) for s in trained},
+            neutral_features={s: found for s, found in rests.items() if found is not None},
         )

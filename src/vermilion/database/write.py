@@ -16,7 +16,7 @@ from vermilion.storage.files import atomic_path
 
 
 def common_mask(subjects: Sequence[SubjectEntry], min_share: float) -> np.ndarray:
-    """Triangles in every subject's mask, ascending ids.
+    """Triangles (M,) in every subject's mask, ascending ids.
 
     Raises InputError where some subject keeps less than `min_share` of its own mask.
     """

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from vermilion.config.regressors import is_variant
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, Corrector
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
-from vermilion.evaluation.corrected import CoarseTake, corrected_by
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
 from vermilion.evaluation.reference import MatchTolerance, Reference, truth_of_vertices
 from vermilion.evaluation.take import TakeResult
@@ -42,10 +44,20 @@ class Regressed:
     seconds: float
 
     @classmethod
-    def of(cls, model: LipModel, take: CoarseTake, rows: np.ndarray) -> Regressed:
-        """Meshes of the frames `rows` of the take, whose other frames are their neighbours."""
-        corrected_mm, seconds = corrected_by(model, take)
-        return cls(model, corrected_mm[rows], seconds)
+    def of(
+        cls, model: LipModel, take: CoarseTake, settings: CorrectionSettings, rows: np.ndarray
+    ) -> Regressed:
+        """Meshes of the frames `rows` of the take, whose other frames are their neighbours.
+
+        The time is that from features to vertices. The factorisation, once a person, and what is compiled
+        at the first frame are not in it. NaN where no frame is usable.
+        """
+        corrector, usable = Corrector(model, take, settings), take.usable(take.features)
+        corrector.correct(take[np.flatnonzero(usable)[:1]])
+        start = time.perf_counter()
+        corrected_mm = corrector.correct(take)[rows]
+        seconds = time.perf_counter() - start
+        return cls(model, corrected_mm, seconds / usable.sum() if usable.any() else np.nan)
 
 
 def points_on_truth(
@@ -58,7 +70,12 @@ def points_on_truth(
     max_distance_mm: float,
     max_normal_angle_deg: float,
 ) -> SurfacePoints:
-    """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`."""
+    """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`.
+
+    Args:
+        h_neutral_mm, truth_neutral_mm: (V_H, 3), (V', 3), the same frame in the world of the rig.
+        truth_triangles: (T', 3).
+    """
     return truth_of_vertices(
         correspondence.vertices,
         Mesh(np.asarray(h_neutral_mm, dtype=np.float64), correspondence.accurate_triangles),
@@ -83,6 +100,7 @@ def sums_of_contours(
     Args:
         sequence_mm, coarse_mm: (F, V, 3) in the camera's world.
         outer_px, inner_px: (F, n, 2) contour points found in the image; NaN where none.
+        clips: (F,) clip of each frame.
     """
     eyes = camera.project(coarse_mm[:, tracker.landmarks[list(_EYE_CORNERS)]])
     distance = contour_error(
@@ -114,7 +132,7 @@ def layer_errors(regressed: Regressed, take: CoarseTake, true: TrueLayers) -> np
 
 
 def shown_rows(error_mm: np.ndarray, count: int) -> np.ndarray:
-    """Rows, ascending, of the worst frame (F,) mm in each of `count` equal stretches."""
+    """Rows, ascending, of the frame of the largest `error_mm` (F,) in each of `count` equal stretches."""
     stretches = np.array_split(np.arange(len(error_mm)), min(count, len(error_mm)))
     filled = np.nan_to_num(error_mm)
     return np.array([part[np.argmax(filled[part])] for part in stretches if len(part)])
@@ -123,7 +141,6 @@ def shown_rows(error_mm: np.ndarray, count: int) -> np.ndarray:
 def shown_arrays(
     result: TakeResult,
     take: CoarseTake,
-    frames: np.ndarray,
     count: int,
     reference: Reference,
     neutral_mm: np.ndarray,
@@ -160,7 +177,7 @@ def shown_arrays(
         "surface_mm": head.apply(reference.vertices_mm[chosen][:, used]),
     }
     return {name: values.astype(np.float32) for name, values in arrays.items()} | {
-        "frames": frames[chosen],
+        "frames": take.frames[chosen],
         "regressors": np.array(names),
         "surface_triangles": np.searchsorted(used, reference.triangles),
         "triangles": tracker.triangles,

@@ -83,7 +83,9 @@ def evaluate_take(
         frames: (F,) frame numbers.
         regions: of the topology of the sequences; vertices without a counterpart are left out here.
         reference: of the same frames.
+        model: face model of the sequences' topology.
         clip_frames, min_clips: of `clips_of`.
+        tolerances: of lips that touch, gape or pass through each other.
         curves: true expression weights of the frames, by which the kinds of mouth shapes are known;
             without them the reference's shape decides.
     """
@@ -93,13 +95,7 @@ def evaluate_take(
         for name, s in sequences_mm.items()
     }
     head = align_frames(reference.points_mm, model.neutral_mm, regions.rest)
-    if curves is not None:
-        kinds = kinds_of_curves(curves)
-    else:
-        rest = reference.rest_mm[None]
-        rest = align_frames(rest, model.neutral_mm, regions.rest).apply(rest)[0]
-        posed = head.apply(reference.points_mm)
-        kinds = kinds_of_shapes(posed, rest, model, reference.valid)
+    kinds = _mouth_kinds(model, regions, reference, head, curves)
     clips = clips_of(frames, clip_frames, min_clips)
     sides, columns = lip_sides(model, with_inside=True), columns_of(model)
     true_gaps = gaps_in_head(reference.points_mm, head.rotations, sides, columns)
@@ -111,6 +107,7 @@ def evaluate_take(
     sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
         gaps = gaps_in_head(sequence, head.rotations, sides, columns)
+        through = lip_depths(sequence, model) > tolerances.through_mm
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
@@ -118,13 +115,26 @@ def evaluate_take(
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)
-            + sums_of_frames(
-                "mouth.through", lip_depths(sequence, model) > tolerances.through_mm, clips
-            )
+            + sums_of_frames("mouth.through", through, clips)
         )
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
     return TakeResult(sums, table, aligned, errors, head, kinds, clips)
+
+
+def _mouth_kinds(
+    model: FaceModel,
+    regions: Regions,
+    reference: Reference,
+    head: FrameAlignment,
+    curves: Sequence[Mapping[str, float]] | None,
+) -> np.ndarray:
+    """(F,) kind of mouth shape: by the true expression weights, or by the reference's shape."""
+    if curves is not None:
+        return kinds_of_curves(curves)
+    rest = reference.rest_mm[None]
+    rest = align_frames(rest, model.neutral_mm, regions.rest).apply(rest)[0]
+    return kinds_of_shapes(head.apply(reference.points_mm), rest, model, reference.valid)
 
 
 def evaluate_reconstruction(
@@ -140,7 +150,7 @@ def evaluate_reconstruction(
     """Measure **H** itself against known truth, in the rig's world, without alignment.
 
     Args:
-        sequence_mm: (F, V, 3) of H.
+        sequence_mm: (F, V, 3) of H, world; frames: (F,) frame numbers.
         reference: truth, followed from the neutral.
         drift_mm: (F, V) of `drift`.
         seen: (F, V) bool, reference points that enough cameras see; the region `visible` is what
@@ -163,7 +173,7 @@ def evaluate_reconstruction(
 
 
 def sums_of_layers(errors: np.ndarray, clips: np.ndarray) -> ClipSums:
-    """Sums behind `feature_error`, of the RMS error of each frame's layer (F,); NaN does not count."""
+    """Sums by `clips` (F,) of the RMS `errors` (F,) of each frame's layer; NaN does not count."""
     known = np.isfinite(errors)
     return ClipSums(
         {
@@ -174,7 +184,7 @@ def sums_of_layers(errors: np.ndarray, clips: np.ndarray) -> ClipSums:
 
 
 def with_layer_errors(table: pd.DataFrame, errors: Mapping[str, np.ndarray]) -> pd.DataFrame:
-    """The table of `TakeResult` with a column `feature_error`: of each regressor (F,), else NaN."""
+    """The table of `TakeResult` with a column `feature_error`: regressor -> `errors` (F,), else NaN."""
     column = np.full(len(table), np.nan)
     for name, of_frames in errors.items():
         column[(table["regressor"] == name).to_numpy()] = of_frames

@@ -55,7 +55,7 @@ def lipstick(colour: str, opacity: float) -> Pigment:
 def eye_shadow(
     model: FaceModel, neutral_mm: np.ndarray, colour: str, opacity: float, height_mm: float = 14.0
 ) -> Pigment:
-    """From the edge of the upper lids up to `height_mm` above them, fading out."""
+    """From the edge of the upper lids of `neutral_mm` (V, 3) up to `height_mm` above them, fading out."""
     lids = [neutral_mm[model.landmarks[eye[:4]]] for eye in (EYE_RIGHT, EYE_LEFT)]
     lids = [lid[np.argsort(lid[:, 0])] for lid in lids]
 
@@ -76,7 +76,7 @@ def eye_shadow(
 def star(
     centre_mm: np.ndarray, size_mm: float, turn: float, colour: str, opacity: float
 ) -> Pigment:
-    """A five-pointed star, drawn on the face from the front; `turn` in radians."""
+    """A five-pointed star about `centre_mm` (3,), head frame, seen from the front; `turn` in radians."""
     # The edge from a tip (straight up) to a notch (36 degrees), as a line's normal form.
     tip = np.array([0.0, size_mm])
     notch = 0.42 * size_mm * np.array([np.sin(np.pi / 5), np.cos(np.pi / 5)])
@@ -95,7 +95,7 @@ def star(
 
 
 def lip_outline(model: FaceModel, neutral_mm: np.ndarray) -> np.ndarray:
-    """How far (V,) mm inside the lips' outer contour the vertices lie, seen from the front."""
+    """How far (V,) mm inside the lips' outer contour `neutral_mm` (V, 3) lies, seen from the front."""
     # The loop runs along edges of the mesh, in steps that no lipstick has.
     loop = gaussian_filter1d(neutral_mm[model.outer_contour, :2], _SMOOTH, axis=0, mode="wrap")
     loop = loop.astype(np.float32)

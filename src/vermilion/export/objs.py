@@ -12,7 +12,7 @@ from vermilion.storage.files import atomic_path
 def write_obj(
     path: str | Path, vertices_mm: np.ndarray, triangles: np.ndarray, uv: np.ndarray | None = None
 ) -> None:
-    """Write (V, 3) mm and (T, 3) as OBJ, millimetres, with (V, 2) texture coordinates if given."""
+    """Write `vertices_mm` (V, 3), `triangles` (T, 3) and, if given, `uv` (V, 2) as OBJ in millimetres."""
     with atomic_path(path) as temporary, open(temporary, "w") as stream:
         stream.write("# millimetres\n")
         np.savetxt(stream, vertices_mm, "v %.4f %.4f %.4f")

@@ -72,7 +72,7 @@ class Crop:
 def crop_round(
     points_px: np.ndarray, image_px: tuple[int, int], margin: float, height_px: int
 ) -> Crop:
-    """The crop round all of (..., 2) projected points, within the image, `height_px` high when shown.
+    """The crop round projected `points_px` (..., 2), within the image, `height_px` high when shown.
 
     NaN points do not count. Half a per cent of points on each side may lie outside. `margin` is a
     share of the points' extent; `image_px` is (width, height).
@@ -88,7 +88,7 @@ def crop_round(
 def strips_following(
     points_px: np.ndarray, margin: float, size_px: tuple[int, int], smooth_frames: float = 4.0
 ) -> list[Crop]:
-    """Crops of one scale that follow the points (F, N, 2) smoothly and fill `size_px` when shown.
+    """Crops of one scale that follow `points_px` (F, N, 2) smoothly and fill `size_px` when shown.
 
     `size_px` is (width, height). Frames without finite points take the centre of their neighbours.
     """
@@ -120,7 +120,7 @@ def _extent(points_px: np.ndarray, image_px: tuple[int, int]) -> tuple[np.ndarra
 
 
 def lip_colours(triangles: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
-    """(V, 3) colours in [0, 1]: light skin, lips slightly red; `vermilion` (V,) bool.
+    """(V, 3) colours in [0, 1]: light skin, lips slightly red; `triangles` (T, 3), `vermilion` (V,) bool.
 
     The border is softened over one ring of vertices.
     """
@@ -148,7 +148,7 @@ def overlay_image(
         image: (h, w, 3) uint8 sRGB, the whole frame.
         crops: of one panel width; the first row carries the labels.
         meshes: (label, (V, 3) world mm) pairs; None where the frame has no mesh.
-        colours: (V, 3) in [0, 1].
+        triangles: (T, 3) to draw; colours: (V, 3) in [0, 1].
         caption: written into the first panel (take, frame).
     """
     rows = []

@@ -53,6 +53,7 @@ class ContourSampler:
 
     @classmethod
     def of(cls, model: FaceModel, n_samples: int, settings: SearchSettings) -> ContourSampler:
+        """On the lips of a face model, `n_samples` (a multiple of 20) a ring."""
         outer, inner = lip_rings(model, n_samples)
         return cls(outer, inner, model.landmarks[EYE_CORNERS], settings)
 
@@ -108,7 +109,7 @@ class ContourSampler:
 
 
 def interocular_px(corners_mm: np.ndarray, camera: Camera) -> float:
-    """Inter-ocular distance (2, 3) mm as it would look parallel to the image, in pixels.
+    """Distance of eye corners `corners_mm` (2, 3), world, as it would look parallel to the image, px.
 
     Unlike the distance of the projected corners it does not shrink when the head turns.
     """

@@ -15,8 +15,8 @@ OUTER_COLOUR, INNER_COLOUR, MISSING_COLOUR = (70, 255, 90), (255, 70, 60), (255,
 def contours_overlay(
     image: np.ndarray, contours: FrameContours, frame: int, side_px: int = 320
 ) -> np.ndarray:
-    """The mouth (side, side, 3) uint8: model's contours blue, found ones green and red; samples
-    without a maximum magenta."""
+    """The mouth of an `image` (h, w, 3) linear RGB, (side, side, 3) uint8: the model's contours blue, found
+    ones green and red, samples without a maximum magenta."""
     region = _region(contours, side_px)
     canvas = to_display(region.crop(image))
     for points in (contours.model_outer_px, contours.model_inner_px):

@@ -31,7 +31,7 @@ class Ring:
         return len(self.start)
 
     def points(self, vertices: np.ndarray) -> np.ndarray:
-        """Samples on a mesh (..., V, 3), (..., n, 3)."""
+        """Samples (..., n, 3) on a mesh `vertices` (..., V, 3)."""
         along = self.fraction[:, None]
         return vertices[..., self.start, :] * (1 - along) + vertices[..., self.end, :] * along
 

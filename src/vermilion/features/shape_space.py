@@ -27,10 +27,11 @@ class ShapeSpace:
 
     @property
     def size(self) -> int:
+        """Number of components."""
         return len(self.projection)
 
     def coefficients(self, displacement_mm: np.ndarray) -> np.ndarray:
-        """Coefficients (F, P) mm of displacements from the neutral (F, V, 3) in the head frame."""
+        """Coefficients (F, P) mm of `displacement_mm` (F, V, 3) from the neutral, head frame."""
         return displacement_mm.reshape(len(displacement_mm), -1) @ self.projection.T
 
 
@@ -57,20 +58,3 @@ def shape_space(model: FaceModel, variance: float) -> ShapeSpace:
     largest = np.abs(components).argmax(axis=1)
     components *= np.sign(components[np.arange(count), largest])[:, None]
     return ShapeSpace(components * np.repeat(root, 3), float(share[count - 1]))
-
-
-def head_displacement(
-    coarse_mm: np.ndarray,
-    rotation: np.ndarray,
-    translation_mm: np.ndarray,
-    neutral_mm: np.ndarray,
-) -> np.ndarray:
-    """Displacement of coarse meshes from the neutral in the head frame, (F, V, 3) mm.
-
-    Args:
-        coarse_mm: (F, V, 3) world.
-        rotation, translation_mm: (F, 3, 3), (F, 3) of `world_from_head`.
-        neutral_mm: (V, 3) in the head frame.
-    """
-    local = (np.asarray(coarse_mm, dtype=np.float64) - translation_mm[:, None]) @ rotation
-    return local - neutral_mm

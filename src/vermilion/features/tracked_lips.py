@@ -27,10 +27,11 @@ class TrackedLips:
 
     @classmethod
     def of(cls, model: FaceModel, n_samples: int = 80) -> TrackedLips:
+        """On the lips of a face model."""
         return cls(*lip_rings(model, n_samples), OccludingContour.of(model))
 
     def rings_px(self, vertices_mm: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-        """Outer and inner ring (n, 2) px of a mesh (V, 3) in the world.
+        """Outer and inner ring (n, 2) px of a mesh `vertices_mm` (V, 3), world.
 
         Sample 0 is the right corner of the mouth, n / 2 the left one, the upper lip between.
         """

@@ -76,16 +76,9 @@ class FeatureTable:
         write_arrays(path, compressed=True, **{name: getattr(self, name) for name in ARRAYS})
 
     @classmethod
-    def load(cls, paths: str | Path | Sequence[str | Path]) -> FeatureTable:
-        """Read one file, or join several. Raises InputError where one is not what `save` wrote."""
-        paths = [paths] if isinstance(paths, str | Path) else list(paths)
-        parts = [_read(path) for path in paths]
-        joined = {
-            name: np.concatenate([part[name] for part in parts])
-            for name in ARRAYS
-            if name != "names"
-        }
-        return cls(names=parts[0]["names"], **joined)
+    def load(cls, path: str | Path) -> FeatureTable:
+        """Read what `save` wrote. Raises InputError on any other file."""
+        return cls(**read_arrays(path, "feature file", ARRAYS))
 
 
 def feature_names(n_shape: int, space: str = "image") -> np.ndarray:
@@ -95,10 +88,17 @@ def feature_names(n_shape: int, space: str = "image") -> np.ndarray:
     return np.array([*shape, *(prefix + name for name in NAMES)])
 
 
-def judge(
+def quality_row(
     frame: int, contours: FrameContours, tracked: bool, has_maps: bool, least_found: float
 ) -> QualityRow:
-    """What is to be said of a frame: valid when tracked, and enough of its outer contour found."""
+    """Quality row of a frame: valid when tracked, and enough of its outer contour found.
+
+    Args:
+        frame: its number.
+        contours: found in it.
+        tracked, has_maps: what the earlier stages say.
+        least_found: share of the outer samples.
+    """
     outer, inner = contours.outer_found.mean(), contours.inner_found.mean()
     away = np.linalg.norm(contours.outer_px - contours.model_outer_px, axis=1)
     figures = {
@@ -114,7 +114,3 @@ def judge(
     if outer < least_found:
         return QualityRow(frame, False, f"only {outer:.0%} of the outer contour found", figures)
     return QualityRow(frame, figures=figures)
-
-
-def _read(path: str | Path) -> dict[str, np.ndarray]:
-    return read_arrays(path, "feature file", ARRAYS)

@@ -65,12 +65,18 @@ class Curve:
             least = np.unravel_index(np.argmin(np.where(close, self.freedom, np.inf)), mean.shape)
         return int(least[0]), int(least[1])
 
+    def parameters(self, rule: Rule) -> dict[str, float]:
+        """`alpha`, and `beta` where the regressor has one, of the choice."""
+        row, column = self.choose(rule)
+        beta = {} if np.isnan(self.betas[row]) else {"beta": float(self.betas[row])}
+        return {"alpha": float(self.alphas[column]), **beta}
+
 
 def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
     """Clip label of each row: contiguous stretches of a sequence, (F,) int.
 
-    Frames are in order of time within a sequence. Clips are shorter than `clip_frames` where that
-    is needed to have one for every fold.
+    Frames are in order of time within one of the `sequences` (F,). Clips are shorter than `clip_frames`
+    where that is needed to have one for every fold.
     """
     sequences = np.asarray(sequences)
     clip_frames = max(1, min(clip_frames, len(sequences) // n_folds))
@@ -86,23 +92,28 @@ def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarra
 
 
 def target_gram(targets: np.ndarray, output_weights: np.ndarray | None = None) -> np.ndarray:
-    """Y Y' (F, F) float64 of targets (F, K) less their mean, outputs weighted (K,)."""
+    """Mean over the outputs of Y Y', (F, F) float64, of targets (F, K) less their mean over frames.
+
+    Args:
+        targets: (F, K).
+        output_weights: (K,) of the outputs in the mean; None: all alike.
+    """
     block = 4096
+    weights = np.ones(targets.shape[1]) if output_weights is None else output_weights
     gram = np.zeros((len(targets), len(targets)))
     for first in range(0, targets.shape[1], block):
         part = targets[:, first : first + block].astype(np.float32)
         part -= part.mean(axis=0, dtype=np.float64).astype(np.float32)
         if output_weights is not None:
-            part *= np.sqrt(output_weights[first : first + block]).astype(np.float32)
+            part *= np.sqrt(weights[first : first + block]).astype(np.float32)
         gram += part @ part.T
-    return gram
+    return gram / weights.sum()
 
 
 def cross_validate(
     estimator: LinearOutputs,
     features: np.ndarray,
     gram: np.ndarray,
-    n_outputs: float,
     sequences: np.ndarray,
     clips: np.ndarray,
     *,
@@ -117,7 +128,6 @@ def cross_validate(
         estimator: with every parameter but alpha and beta as wanted; it is not changed.
         features: (F, M).
         gram: (F, F), `target_gram` of the targets.
-        n_outputs: the sum of the output weights (their number where unweighted).
         sequences: (F,) labels of the sequences, frames in order of time.
         clips: (F,) labels of the clips, or of the people, which are held out whole.
         betas: None for an estimator without.
@@ -135,7 +145,7 @@ def cross_validate(
             design = tried.fit_inputs(features[train], sequences[train])
             judged = tried.activations(features[held])
             squared = _held_out_squared(design, judged, gram, train, held, persons, alphas)
-            of_folds.append(np.sqrt(np.maximum(squared, 0.0) / (len(held) * n_outputs)))
+            of_folds.append(np.sqrt(np.maximum(squared, 0.0) / len(held)))
         errors.append(np.stack(of_folds, axis=1))
         freedom.append(_degrees_of_freedom(tried.fit_inputs(features, sequences), alphas))
     return Curve(
@@ -154,7 +164,10 @@ def held_out_novelty(
     clips: np.ndarray,
     n_folds: int,
 ) -> np.ndarray:
-    """Novelty (F,) of every frame for a training that has not seen its clip."""
+    """Novelty (F,) of `features` (F, M) for a training that has not seen their clip.
+
+    `sequences` and `clips` (F,) are labels, as in `cross_validate`.
+    """
     novelty = np.empty(len(features))
     for train, held in folds_of(clips, n_folds):
         tried = clone(estimator)

@@ -59,7 +59,7 @@ class RBFNetwork(LinearOutputs):
         return gaussian_activations(scaled, self.prototypes_, self.beta)
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """Distance to the nearest prototype; two training frames are 1.4 apart (RMS), (F,)."""
+        """Distance (F,) of `features` (F, M) to the nearest prototype; frames are 1.4 apart (RMS)."""
         return cdist(self.scaled(features), self.prototypes_).min(axis=1)
 
 
@@ -68,7 +68,7 @@ class AffineRegressor(LinearOutputs):
 
 
 def gaussian_activations(scaled: np.ndarray, prototypes: np.ndarray, beta: float) -> np.ndarray:
-    """exp(-beta |p - f|^2), (F, N), of features (F, M) and prototypes (N, M) (Lips16 eq. 2)."""
+    """exp(-beta |p - f|^2), (F, N), of `scaled` features (F, M) and `prototypes` (N, M) (Lips16 eq. 2)."""
     return np.exp(-beta * cdist(scaled, prototypes, "sqeuclidean"))
 
 

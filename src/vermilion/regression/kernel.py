@@ -12,6 +12,7 @@ from vermilion.regression.linear import LinearOutputs
 
 #: Rows whose columns are made together, and how small a rest they may go down to, of the largest.
 _PANEL, _FAIR = 48, 0.3
+_MAX_PIVOTS = 400
 
 
 class KernelRegressor(LinearOutputs):
@@ -26,13 +27,12 @@ class KernelRegressor(LinearOutputs):
 
     The kernel matrix of the F frames is never formed: its pivoted Cholesky factor (Fine and Scheinberg
     2001) takes the frames that are least explained by those before, until no frame's rest is above
-    `tolerance`; then the columns of the factor are the design.
+    `tolerance` or there are 400; then the columns of the factor are the design.
 
     Args (others: `LinearOutputs`):
         beta: scale of the bumps, per squared distance of scaled features (`scaling`).
         linear: variance of the linear part beside that of the smooth one.
         tolerance: rest of the kernel's diagonal that is let go, of its mean.
-        max_pivots: at most so many pivots.
 
     Attributes (fitted): `pivots_` (P, M) scaled, `whitening_` (P, P) from kernel values at the pivots
     to the design, and those of `LinearOutputs`.
@@ -46,7 +46,6 @@ class KernelRegressor(LinearOutputs):
         beta: float = 1.0,
         linear: float = 1.0,
         tolerance: float = 1e-5,
-        max_pivots: int = 400,
         feature_groups: Sequence[str] | None = None,
         reach: float = np.inf,
         fade: float = 2.0,
@@ -57,14 +56,13 @@ class KernelRegressor(LinearOutputs):
         self.beta = beta
         self.linear = linear
         self.tolerance = tolerance
-        self.max_pivots = max_pivots
 
     def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None) -> None:
         rows, factor = pivoted_cholesky(
             lambda rows: self.kernel(scaled, scaled[rows]),
             self._diagonal(scaled),
             self.tolerance,
-            self.max_pivots,
+            _MAX_PIVOTS,
         )
         self.pivots_ = scaled[rows]
         triangle = np.tril(factor[rows])
@@ -74,7 +72,7 @@ class KernelRegressor(LinearOutputs):
         return self.kernel(scaled, self.pivots_) @ self.whitening_
 
     def kernel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """k (F, G) between scaled features (F, M) and (G, M)."""
+        """k (F, G) between scaled features `first` (F, M) and `second` (G, M)."""
         smooth = 1.0 / np.sqrt(1.0 + 2.0 * self.beta * cdist(first, second, "sqeuclidean"))
         return smooth + self.linear * (first @ second.T)
 
@@ -82,7 +80,7 @@ class KernelRegressor(LinearOutputs):
         return 1.0 + self.linear * (scaled**2).sum(axis=1)
 
     def novelty(self, features: np.ndarray) -> np.ndarray:
-        """Standard deviation of a prediction, in units of the smooth part's prior deviation, (F,).
+        """Deviation (F,) of the prediction for `features` (F, M), per the smooth part's prior deviation.
 
         With what the pivots cannot tell; the noise of a single frame is not in it.
         """

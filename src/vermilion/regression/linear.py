@@ -27,7 +27,8 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
 
     Attributes (fitted): `coefficients_` (P, R) and `basis_` (R, K), whose product are the weights,
     `person_biases_` (G, K), `bias_` (K,) of anybody else, `mean_activation_` (P,), `deviation_` (P, P)
-    from the centred design to what is uncertain of a prediction, `feature_mean_`, `feature_scale_`, `feature_low_`, `feature_high_` (M,).
+    from the centred design to what is uncertain of a prediction, `feature_mean_`, `feature_scale_`,
+    `feature_low_`, `feature_high_` (M,).
     """
 
     #: Fitted arrays, by the names that they have in a model file with an underscore.
@@ -114,14 +115,14 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
             neutral = (design[first].mean(axis=0) @ self.coefficients_) @ self.basis_
             kinds = np.split(np.arange(targets.shape[1]), [n_layers or targets.shape[1]])
             self.bias_ = np.concatenate(
-                [bias_of_a_stranger(biases[:, k], neutral[k]) for k in kinds if len(k)]
+                [unseen_subject_bias(biases[:, k], neutral[k]) for k in kinds if len(k)]
             ).astype(weights.dtype)
         return self
 
     def fit_inputs(
         self, features: np.ndarray, sequences: np.ndarray | None = None, **chosen
     ) -> np.ndarray:
-        """Fit all but the weights on features (F, M): enough for `novelty`. Returns the design."""
+        """Design (F, P) of `features` (F, M) in `sequences` (F,): fits all but the weights."""
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2:
             raise ValueError(f"features must be (F, M), got {features.shape}")
@@ -138,7 +139,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         return design
 
     def scaled(self, features: np.ndarray) -> np.ndarray:
-        """Features (F, M) in the estimator's own scale, float64."""
+        """`features` (F, M) in the estimator's own scale, (F, M) float64."""
         check_is_fitted(self, "feature_scale_")
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or features.shape[1] != self.n_features_in_:
@@ -153,11 +154,11 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         return self.mean_activation_ + trust(scaled, held, self.fade) * added
 
     def mixture(self, features: np.ndarray) -> np.ndarray:
-        """Coefficients (F, R) of the basis, in its precision."""
+        """Coefficients (F, R) of the basis for `features` (F, M), in its precision."""
         return (self.activations(features) @ self.coefficients_).astype(self.basis_.dtype)
 
     def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
-        """Outputs (F, K), in the precision of the weights; `person` as labelled in `fit`."""
+        """Outputs (F, K) for `features` (F, M), in the precision of the weights; `person` as in `fit`."""
         return self.mixture(features) @ self.basis_ + self.bias_of(person)
 
     def bias_of(self, person: int | None) -> np.ndarray:
@@ -218,12 +219,12 @@ def uncertain_directions(centred: np.ndarray, alpha: float) -> np.ndarray:
     return np.sqrt(alpha) * inverse
 
 
-def bias_of_a_stranger(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
-    """Bias (K,) for a person whom the training has not seen.
+def unseen_subject_bias(biases: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """Bias (K,) for a subject whom the training has not seen.
 
-    The layer at the neutral is identity. A stranger's is expected to be the mean of those seen,
-    drawn towards none by what that mean is worth: c = 1 - var / (G mean^2) of the G people. Of one
-    person alone nothing tells what is theirs and what everybody's: none of it is a stranger's.
+    The layer at the neutral holds the identity. That of an unseen subject is the mean of those seen,
+    shrunk towards zero by the reliability of that mean: c = 1 - var / (G mean^2) of the G people. One
+    person alone does not tell their own share from everybody's, so then the identity is zero.
 
     Args:
         biases: (G, K) of the people seen.

@@ -70,10 +70,11 @@ class LipModel:
 
     @property
     def training_subjects(self) -> tuple[str, ...]:
+        """Subjects who have training frames, sorted."""
         return tuple(sorted({name.split("/")[0] for name in self.training_frames}))
 
     def person_of(self, neutral_mm: np.ndarray | None) -> int | None:
-        """Which person of the training has this coarse neutral (V, 3); None for nobody."""
+        """Which person of the training has the coarse `neutral_mm` (V, 3), head frame; None for nobody."""
         if neutral_mm is None:
             return None
         for index, known in enumerate(self.neutrals_mm.values()):
@@ -97,20 +98,20 @@ class LipModel:
     def displacements_mm(
         self, features: np.ndarray, neutral_mm: np.ndarray | None = None
     ) -> np.ndarray:
-        """Displacements (F, N, 3) from C, head frame, of features (F, M); as in `predict`."""
+        """Displacements (F, N, 3) mm from C, head frame, of `features` (F, M); `neutral_mm` as in `predict`."""
         person = self.person_of(neutral_mm)
         flat = self.estimator.predict(self._chosen(features, person), person)
         places = flat[:, 9 * len(self.mask) :].reshape(len(features), -1, 3)
         return DISPLACEMENT_UNIT_MM * places
 
     def mixture(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
-        """Coefficients (F, R) of the layers' basis, of features (F, M); person as in `predict`."""
+        """Coefficients (F, R) of the basis, of `features` (F, M); `neutral_mm` as in `predict`."""
         return self.estimator.mixture(self._chosen(features, self.person_of(neutral_mm)))
 
     def basis(self, neutral_mm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Layers (R + 1, T * 9) and displacements (R + 1, N * 3) mm that `mixture` mixes.
 
-        The last row is the bias, of which every frame has one.
+        The last row is the bias of the person with `neutral_mm` (V, 3), of which every frame has one.
         """
         bias = self.estimator.bias_of(self.person_of(neutral_mm))
         rows = np.concatenate([self.estimator.basis_, bias[None]])
@@ -118,7 +119,7 @@ class LipModel:
         return layers, DISPLACEMENT_UNIT_MM * places
 
     def novelty(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
-        """How far features (F, M) lie from what was trained on, (F,); see the estimators."""
+        """How far `features` (F, M) of the person with `neutral_mm` (V, 3) lie from the training, (F,)."""
         return self.estimator.novelty(self._chosen(features, self.person_of(neutral_mm)))
 
     def check_topology(self, triangles: np.ndarray, path: str | Path | None = None) -> None:
@@ -204,18 +205,12 @@ def _check_header(file: h5py.File, path: str | Path) -> None:
             path=path,
         )
     version = int(file.attrs["format_version"])
-    if version < FORMAT_VERSION:
+    if version != FORMAT_VERSION:
+        newer = version > FORMAT_VERSION
         raise ModelFileError(
-            f"format version {version}, of an older Vermilion",
+            f"format version {version}, written by Vermilion {file.attrs.get('vermilion_version')}",
             f"version {FORMAT_VERSION}",
-            "Train the regressor again with this version.",
-            path=path,
-        )
-    if version > FORMAT_VERSION:
-        raise ModelFileError(
-            f"format version {version}, written by Vermilion {file.attrs['vermilion_version']}",
-            f"at most version {FORMAT_VERSION}",
-            "Update Vermilion, or train the regressor with this version.",
+            f"{'Update Vermilion, or train' if newer else 'Train'} the regressor again with this version.",
             path=path,
         )
 

@@ -54,7 +54,7 @@ def ridge_weights(
 
 
 def person_averages(persons: np.ndarray) -> sparse.csr_array:
-    """Matrix (G, F) that averages the rows of each person; labels (F,) in 0 .. G - 1."""
+    """Matrix (G, F) that averages the rows of each person; `persons` (F,) in 0 .. G - 1."""
     counts = np.bincount(persons)
     data = 1.0 / counts[persons]
     return sparse.csr_array(

@@ -55,7 +55,7 @@ def feature_range(scaled: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndar
 
 
 def trust(scaled: np.ndarray, held: np.ndarray, fade: float) -> np.ndarray:
-    """How much a prediction counts whose features (F, M) had to be held within the reach, (F, 1).
+    """How much a prediction counts whose features `scaled` were `held` within reach, both (F, M): (F, 1).
 
     1 / (1 + (d / fade)^2) of the distance d by which they were held, in units where the training
     lies 1 from its mean in the root mean square.

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import VARIANTS, Estimator, split_name
 from vermilion.regression.cross_validation import (
     Curve,
     Rule,
@@ -24,20 +25,7 @@ from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
 from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
 
-Kind = Literal["rbf", "affine", "kernel"]
-
-#: Variant -> (estimator, features); None is the estimator of the configuration.
-VARIANTS: dict[str, tuple[Kind | None, str]] = {
-    "": (None, "all"),
-    "rbf": ("rbf", "all"),
-    "affine": ("affine", "all"),
-    "kernel": ("kernel", "all"),
-    "shape-only": (None, "shape"),
-    "distances-only": (None, "distances"),
-    "paper": ("rbf", "all"),
-}
-
-#: Fewer people tell nothing of strangers: GR is then judged by clips, as PS and MS.
+#: Fewer people tell nothing of unseen subjects: folds of GR are then clips, as those of PS and MS.
 LEAST_PEOPLE = 3
 
 
@@ -45,7 +33,7 @@ LEAST_PEOPLE = 3
 class Selection:
     """How the parameters are chosen; the fields are those of the configuration's `training`."""
 
-    regressor: Kind = "kernel"
+    regressor: Estimator = "kernel"
     prototype_stride: int = 10
     prototype_minimum: int = 20
     scaling: Literal["group", "feature"] = "group"
@@ -66,7 +54,7 @@ class Selection:
     anchor: Literal["neutral", "none"] = "neutral"
     novelty_quantile: float = 0.99
 
-    def estimator(self, kind: Kind, groups: Sequence[str] | None) -> LinearOutputs:
+    def estimator(self, kind: Estimator, groups: Sequence[str] | None) -> LinearOutputs:
         """An estimator that lacks only alpha and beta."""
         shared = {
             "feature_groups": groups,
@@ -90,7 +78,7 @@ class Selection:
         """Lips16 5.2 to the letter: one bias, features as they are, no limit, the least error."""
         return replace(self, bias="shared", anchor="none", reach=1e9, choice="least")
 
-    def grid(self, kind: Kind) -> dict[str, list[float] | None]:
+    def grid(self, kind: Estimator) -> dict[str, list[float] | None]:
         """`alphas` and `betas` to try, ascending."""
         alphas, betas = {
             "rbf": (self.alphas, self.betas),
@@ -98,36 +86,6 @@ class Selection:
             "kernel": (self.kernel_alphas, self.kernel_betas),
         }[kind]
         return {"alphas": sorted(alphas), "betas": None if betas is None else sorted(betas)}
-
-
-def split_name(regressor: str) -> tuple[str, str | None, str]:
-    """(kind, subject, variant) of a regressor's name: `MS`, `PS-anna`, `GR-anna-affine`, ...
-
-    Raises InputError on any other name.
-    """
-    base, variant = regressor, ""
-    for name in VARIANTS:
-        if name and regressor.endswith(f"-{name}"):
-            base, variant = regressor.removesuffix(f"-{name}"), name
-    kind, dash, subject = base.partition("-")
-    if (kind == "MS" and not dash) or (kind in ("PS", "GR") and subject):
-        return kind, subject or None, variant
-    raise InputError(
-        f"a regressor named {regressor!r}",
-        "MS, PS-<subject> or GR-<subject>, with an optional variant "
-        + ", ".join(f"-{v}" for v in VARIANTS if v),
-        "Correct the name.",
-    )
-
-
-def training_subjects(regressor: str, subjects: Sequence[str]) -> list[str]:
-    """Whose frames a regressor trains on (Lips16 section 6): one, all, or all but one subject."""
-    kind, subject, _ = split_name(regressor)
-    if kind == "MS":
-        return sorted(subjects)
-    if kind == "PS":
-        return [s for s in sorted(subjects) if s == subject]
-    return [s for s in sorted(subjects) if s != subject]
 
 
 def feature_group(name: str) -> str:
@@ -152,18 +110,53 @@ def train(
     Args:
         name: of the regressor, with its variant.
         data: rows of the database.
+        feature_names: of all M features.
         mask, area_mm2: (T,) the layer's triangles and their areas, which weight the errors.
         topology: hash of the coarse topology.
         vertices: (N,) corners of the mask, whose displacements are regressed with the layers (but for
             the variant `paper`, which is the paper's in all).
+        selection: how the parameters are chosen.
+
+    Raises:
+        InputError: no feature is of the kind that the variant reads.
     """
-    variant = split_name(name)[2]
+    group, _, variant = split_name(name)
     kind, wanted = VARIANTS[variant]
     kind = kind or selection.regressor
     displacements_mm = data.displacements_mm
     if variant == "paper":
         selection, vertices = selection.as_in_the_paper(), vertices[:0]
         displacements_mm = displacements_mm[:, :0]
+    columns, kinds = _columns(name, feature_names, wanted)
+    shifts, neutral_features = _shifts(data, selection)
+    features = data.features.astype(np.float64)
+    features = (features - shifts[data.persons] if len(shifts) else features)[:, columns]
+    persons = data.persons if selection.bias == "person" else None
+    clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
+    # GR is for unseen subjects, so its folds hold out whole people.
+    by_person = group == "GR" and len(np.unique(data.persons)) >= LEAST_PEOPLE
+    estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
+    weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
+    curve = cross_validate(
+        estimator, features, target_gram(data.layers, weights), data.sequences,
+        data.persons if by_person else clips, **selection.grid(kind), n_folds=selection.folds,
+        persons=persons,
+    )  # fmt: skip
+    estimator.set_params(**curve.parameters(selection.choice))
+    places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
+    targets = np.concatenate([data.layers, places], axis=1)
+    estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
+    novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
+    model = LipModel(
+        name, estimator, tuple(feature_names), columns, mask, topology, data.frames_of_takes(),
+        vertices, data.neutrals_mm if persons is not None else {}, shifts, neutral_features,
+        novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
+    )  # fmt: skip
+    return model, curve
+
+
+def _columns(name: str, feature_names: Sequence[str], wanted: str) -> tuple[np.ndarray, list[str]]:
+    """Columns (M',) of the features that are wanted, and the kind of each."""
     kinds = np.array([feature_group(feature) for feature in feature_names])
     columns = np.flatnonzero((kinds == wanted) | (wanted == "all"))
     if not len(columns):
@@ -172,56 +165,7 @@ def train(
             f"some of kind {wanted}",
             f"Leave the variant {name} out, or make such features.",
         )
-    shifts, neutral_features = _shifts(data, selection)
-    features = data.features.astype(np.float64)
-    features = (features - shifts[data.persons] if len(shifts) else features)[:, columns]
-    groups = list(kinds[columns]) if selection.scaling == "group" else None
-    weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
-    clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
-    # GR is for people that it has not seen, and is judged by such.
-    people = len(np.unique(data.persons))
-    by_person = split_name(name)[0] == "GR" and people >= LEAST_PEOPLE
-    persons = data.persons if selection.bias == "person" else None
-    estimator = selection.estimator(kind, groups)
-    curve = cross_validate(
-        estimator,
-        features,
-        target_gram(data.layers, weights),
-        weights.sum(),
-        data.sequences,
-        data.persons if by_person else clips,
-        **selection.grid(kind),
-        n_folds=selection.folds,
-        persons=persons,
-    )
-    row, column = curve.choose(selection.choice)
-    estimator.set_params(alpha=float(curve.alphas[column]))
-    if not np.isnan(curve.betas[row]):
-        estimator.set_params(beta=float(curve.betas[row]))
-    places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
-    targets = np.concatenate([data.layers, places], axis=1)
-    estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
-    novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
-    used = {
-        take: data.frames[data.sequences == k]
-        for k, take in enumerate(data.takes)
-        if (data.sequences == k).any()
-    }
-    model = LipModel(
-        name=name,
-        estimator=estimator,
-        feature_names=tuple(feature_names),
-        feature_columns=columns,
-        mask=mask,
-        topology=topology,
-        vertices=vertices,
-        training_frames=used,
-        neutrals_mm=data.neutrals_mm if persons is not None else {},
-        shifts=shifts,
-        neutral_features=neutral_features,
-        novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
-    )
-    return model, curve
+    return columns, list(kinds[columns])
 
 
 def _shifts(data: TrainingSet, selection: Selection) -> tuple[np.ndarray, np.ndarray]:

@@ -43,3 +43,8 @@ class TrainingSet:
         of_take = [self.takes[k].split("/")[0] for k in range(len(self.takes))]
         index = [self.subjects.index(s) if s in self.subjects else -1 for s in of_take]
         return np.asarray(index, dtype=np.int64)[self.sequences]
+
+    def frames_of_takes(self) -> dict[str, np.ndarray]:
+        """Take -> frame numbers (n,) of its rows, of the takes that have any."""
+        rows = {take: self.sequences == k for k, take in enumerate(self.takes)}
+        return {take: self.frames[of_take] for take, of_take in rows.items() if of_take.any()}

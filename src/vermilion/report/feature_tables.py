@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from vermilion.config.regressors import split_name
 from vermilion.evaluation.comparisons import KINDS
-from vermilion.regression.training import split_name
 
 #: Variant -> what the tables call it.
 FEATURES = {

@@ -26,7 +26,7 @@ from vermilion.config.evaluation import (
     ReferenceConfig,
 )
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity
 
@@ -77,11 +77,11 @@ def write_truth(folder, truth, triangles):
 
 def add_contours(path):
     """Contours that were not found: the scene has no images."""
-    arrays = load_arrays(path)
+    arrays = read_arrays(path, "feature file")
     nothing = np.full((len(arrays["frames"]), 8, 2), np.nan)
     found = np.zeros(nothing.shape[:2], dtype=bool)
     none = {"outer_px": nothing, "inner_px": nothing, "outer_found": found, "inner_found": found}
-    save_arrays(path, arrays | none)
+    write_arrays(path, **arrays | none)
 
 
 def write_identity(root, subject):
@@ -116,20 +116,30 @@ def run_lip_shapes(root):
     )
 
 
-def evaluate(root, name, truth):
-    take, out = root / f"takes/{SUBJECT}/rom", root / f"evaluation/{name}"
-    known = [root / f"truth/{SUBJECT}/rom/{part}.npy" for part in ("vertices_mm", "triangles")]
-    inputs = {
+def take_inputs(root):
+    """Files of the subject's take that evaluation and application read."""
+    take = root / f"takes/{SUBJECT}/rom"
+    one = {
         "tracker": root / "face/tracker.npz",
-        "template": root / "face/template.npz",
         "correspondence": root / f"subjects/{SUBJECT}/correspondence.npz",
         "identity": root / f"subjects/{SUBJECT}/identity.npz",
         "neutral_pair": take / "correction/neutral_pair.npz",
-        "neutral_of_take": take / "correction/neutral_pair.npz",
-        "shapes": root / "evaluation/lip_shapes.npz",
         "fit": take / "tracking/fit.npz",
+    }
+    many = {
         "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
         "features": [take / f"features/{c}.npz" for c in CHUNKS],
+    }
+    return {k: str(v) for k, v in one.items()} | {k: [*map(str, v)] for k, v in many.items()}
+
+
+def evaluate(root, name, truth):
+    take, out = root / f"takes/{SUBJECT}/rom", root / f"evaluation/{name}"
+    known = [root / f"truth/{SUBJECT}/rom/{part}.npy" for part in ("vertices_mm", "triangles")]
+    inputs = take_inputs(root) | {
+        "template": root / "face_model/template.npz",
+        "neutral_of_take": take / "correction/neutral_pair.npz",
+        "shapes": root / "evaluation/lip_shapes.npz",
         "layers": [take / f"correction/layers/{c}.npz" for c in CHUNKS],
         "models": [root / f"models/{m}.h5" for m in MODELS],
         "accurate": [take / f"multiview/H/{c}.npy" for c in CHUNKS],

@@ -4,25 +4,19 @@ import numpy as np
 
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
-from vermilion.correction.correct import correct_sequence
-from vermilion.correction.image_contours import (
-    IMAGE_ARRAYS,
-    ImageContours,
-    ImageContourSettings,
-    frames_around,
-)
-from vermilion.correction.neutral_pair import acquainted, neutral_pairs
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, correct
+from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.video import write_video
 from vermilion.regression.model import load_model
-from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
-from vermilion.storage.sequences import frames_of, write_sequence
+from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
 
 
@@ -36,45 +30,39 @@ def quality_row(frame, tracked, has_features, figures):
     return QualityRow(frame, True, "outside the training's span" if outside else "", figures)
 
 
+def corrected_take(inputs, tracker, fit, cfg, frames, fps):
+    """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor that made them."""
+    settings = CorrectionConfig(
+        integration=cfg["correction.integration"], image=cfg["correction.image"]
+    )
+    pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
+    model = with_known_neutrals(load_model(inputs.model), tracker.triangles, *pairs)
+    take = CoarseTake.load(
+        tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
+        frames, settings.reach_frames(fps),
+    )  # fmt: skip
+    corrected = correct(model, take, CorrectionSettings.of(settings, fps))
+    asked = np.searchsorted(take.frames, frames)
+    return take[asked], corrected[asked], model
+
+
 def main(snakemake):
     inputs, params, out = snakemake.input, snakemake.params, snakemake.output
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     frames, overlay = params.frames, OverlayConfig(**params.cfg["apply.overlay"])
-    tracker, model = FaceModel.load(inputs.tracker), load_model(inputs.model)
-    model = acquainted(model, tracker.triangles, *neutral_pairs(inputs))
-    identity, fit = Identity.load(inputs.identity), TrackedTake.load(inputs.fit)
-    settings = CorrectionConfig(
-        integration=params.cfg["correction.integration"], image=params.cfg["correction.image"]
-    )
-    near = frames_around(frames, frames_of(inputs.coarse), settings.reach_frames(params.fps))
-    given = read_chunks(inputs.features, near, ["features", *IMAGE_ARRAYS])
-    features = np.where(given["valid"][:, None], given["features"], np.nan)
-    coarse = np.asarray(read_frames(inputs.coarse, near), dtype=np.float64)
-    pose, rows = (
-        (fit.world_from_head_rotation, fit.world_from_head_translation_mm),
-        fit.index_of(near),
-    )
-    image = ImageContours.of(
-        tracker, fit.camera, near, given, ImageContourSettings(**params.cfg["correction.image"])
-    )
-    corrected = correct_sequence(
-        model, coarse, tracker.triangles, identity.neutral_mm, pose[0][rows], pose[1][rows],
-        features, valid=fit.valid[rows], frames=near, image=image,
-        **settings.integration.at(params.fps),
-    )  # fmt: skip
-    asked = np.searchsorted(near, frames)
-    coarse, corrected, features, rows = (a[asked] for a in (coarse, corrected, features, rows))
-    has_features, tracked = np.isfinite(features).all(axis=1), fit.valid[rows]
+    tracker, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    take, corrected, model = corrected_take(inputs, tracker, fit, params.cfg, frames, params.fps)
     # The image shows what the file holds: beyond its precision, sums differ from run to run.
     corrected = corrected.astype(np.float32).astype(np.float64)
     write_sequence(out.corrected, corrected)
 
+    has_features = np.isfinite(take.features).all(axis=1)
     novelty = np.full(len(frames), np.nan)
-    novelty[has_features] = model.novelty(features[has_features], identity.neutral_mm)
-    moved = np.linalg.norm(corrected - coarse, axis=2).max(axis=1)
+    novelty[has_features] = model.novelty(take.features[has_features], take.neutral_mm)
+    moved = np.linalg.norm(corrected - take.coarse_mm, axis=2).max(axis=1)
     rows_of_quality = [
         quality_row(
-            int(frame), bool(tracked[i]), bool(has_features[i]),
+            int(frame), bool(take.valid[i]), bool(has_features[i]),
             {
                 "novelty": novelty[i],
                 "novelty_limit": model.novelty_limit,
@@ -86,13 +74,14 @@ def main(snakemake):
     write_quality(out.quality, *place, "apply", rows_of_quality)
 
     source, camera = open_frames(params.source, *place), fit.camera
+    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
     view = framing(
-        tracker, identity.neutral_mm, *pose, fit.valid, camera, overlay.margin,
-        overlay.panel_height_px,
+        tracker, take.neutral_mm, *pose, fit.valid, camera, overlay.margin, overlay.panel_height_px
     )  # fmt: skip
     images = overlay_frames(
-        view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames, rows,
-        tracked, [("base track", coarse), (f"corrected, {model.name}", corrected)],
+        view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames,
+        fit.index_of(frames), take.valid,
+        [("base track", take.coarse_mm), (f"corrected, {model.name}", corrected)],
         overlay.opacity, "/".join(place),
     )  # fmt: skip
     write_video(out.overlay, progress(images, "overlay", len(frames)), params.fps)

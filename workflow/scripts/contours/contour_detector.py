@@ -3,11 +3,11 @@
 import numpy as np
 
 from vermilion.config.contours import ContourDetectorConfig
-from vermilion.contours.label_offset import without_lean
+from vermilion.contours.labelled_frames import offset_rows, read_labelled
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
-from vermilion.contours.training import TrainingSettings, read_labelled, train_detector
+from vermilion.contours.training import TrainingSettings, train_detector
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
@@ -80,9 +80,7 @@ def main(snakemake) -> None:
         rings = TrackedRings(snakemake.input, track)
         by_track = from_track(cfg, camera, source, track, rings)
     if labelled and by_track:
-        limits = cfg.label_tolerance, cfg.label_reach
-        labelled, said = without_lean(labelled, by_track, rings, *limits)
-        rows += said
+        rows += offset_rows(labelled, by_track, rings)
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
     else:

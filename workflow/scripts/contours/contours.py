@@ -1,7 +1,7 @@
 """Likelihood maps of the inner and outer lip contour of a chunk (Lips16 3.2.2)."""
 
 from vermilion.config.contours import ContourMapsConfig
-from vermilion.contours.detector import load_detector
+from vermilion.contours.detector_file import load_detector
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.maps import evenly, frame_maps, maps_overlay, sheet, write_maps
 from vermilion.faces.model import FaceModel

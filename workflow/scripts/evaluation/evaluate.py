@@ -1,23 +1,21 @@
 """Every regressor on the held-out frames of a take, against truth or against held-out H."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vermilion.baselines.contour_tracker import ContourTracker, FoundContours
+from vermilion.baselines.contour_tracker import ContourTracker
 from vermilion.baselines.lip_shapes import LipShapes
 from vermilion.config.correction import CorrectionConfig
-from vermilion.config.evaluation import ContourConfig, MeasuresConfig, ReferenceConfig
-from vermilion.correction.image_contours import (
-    IMAGE_ARRAYS,
-    ImageContours,
-    ImageContourSettings,
-    frames_around,
-)
-from vermilion.correction.neutral_pair import acquainted, neutral_pairs
+from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
+from vermilion.config.regressors import measure_name
+from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.correct import CorrectionSettings, correct_with_layers
+from vermilion.correction.image_contours import ImageContours
+from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation import held_out
-from vermilion.evaluation.corrected import CoarseTake, corrected_by_truth, measure_name
 from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.lips import LipTolerances
 from vermilion.evaluation.masks import regions_of_mask
@@ -27,7 +25,7 @@ from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_
 from vermilion.evaluation.truth import read_curves, read_truth
 from vermilion.faces.model import FaceModel
 from vermilion.regression.model import load_model
-from vermilion.storage.arrays import save_arrays
+from vermilion.storage.arrays import write_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -82,57 +80,43 @@ def true_curves(snakemake, frames, place):
     return read_curves(path, frames - snakemake.params.first, **place) if path else None
 
 
-def coarse_take(inputs, tracker, fit, frames, correction, fps):
-    """The coarse track at the frames, with its features and what was found in the image."""
-    rows = fit.index_of(frames)
-    features = read_chunks(inputs.features, frames, ["features", *IMAGE_ARRAYS])
-    settings = ImageContourSettings(**correction.image.model_dump())
-    return CoarseTake(
-        frames,
-        np.asarray(read_frames(inputs.coarse, frames), dtype=np.float64),
-        tracker.triangles,
-        Identity.load(inputs.identity).neutral_mm,
-        fit.world_from_head_rotation[rows],
-        fit.world_from_head_translation_mm[rows],
-        np.where(features["valid"][:, None], features["features"], np.nan),
-        **correction.integration.at(fps),
-        image=ImageContours.of(tracker, fit.camera, frames, features, settings),
-    )
-
-
-def oracle(inputs, correspondence, around, rows):
+def oracle(inputs, correspondence, take, settings, rows):
     """Meshes by the true layers, and the layers, of the `rows` of a take; None without layers."""
     if not inputs.get("layers"):
         return None, None
-    layers = read_chunks(inputs.layers, around.frames, ["layers", "displacement_mm", "valid"])
-    meshes = corrected_by_truth(correspondence.mask, take=around, **layers)[rows]
-    true = held_out.TrueLayers(correspondence.mask, layers["layers"][rows], layers["valid"][rows])
-    return meshes, true
+    mask = correspondence.mask
+    given = read_chunks(inputs.layers, take.frames, ["layers", "displacement_mm", "valid"])
+    with_layers = replace(take, valid=take.valid & given["valid"])
+    meshes = correct_with_layers(
+        mask, given["layers"], given["displacement_mm"], with_layers, settings
+    )
+    return meshes[rows], held_out.TrueLayers(mask, given["layers"][rows], given["valid"][rows])
 
 
-def regressors(inputs, around, rows):
+def regressors(inputs, take, settings, rows):
     """Name -> what each model makes of the `rows` of a take; also told the neutrals that are known."""
-    regressed, pairs = {}, neutral_pairs(inputs)
+    regressed = {}
+    pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
     for path in inputs.models:
         name, model = measure_name(Path(path).stem), load_model(path)
-        take = around.as_in_paper() if name.endswith("/paper") else around
-        regressed[name] = held_out.Regressed.of(model, take, rows)
-        known = model if "/" in name else acquainted(model, around.triangles, *pairs)
+        chosen = settings.as_in_the_paper() if name.endswith("/paper") else settings
+        regressed[name] = held_out.Regressed.of(model, take, chosen, rows)
+        known = model if "/" in name else with_known_neutrals(model, take.triangles, *pairs)
         if known is not model:
-            regressed[f"{name}/neutral"] = held_out.Regressed.of(known, take, rows)
+            regressed[f"{name}/neutral"] = held_out.Regressed.of(known, take, chosen, rows)
     return regressed
 
 
-def contour_track(inputs, tracker, fit, take, correspondence, contours, options):
+def contour_track(inputs, tracker, fit, take, correspondence, contours, cfg):
     """The baseline of Lips16 section 6: lip shapes of the training, fitted to the contours."""
+    seam_mm, ridge = cfg["correction.integration"]["seam_mm"], cfg["evaluation.contour"]["ridge"]
     shapes = LipShapes.load(inputs.shapes).on(
-        correspondence.coarse_neutral_mm, tracker.triangles, take.seam_mm
+        correspondence.coarse_neutral_mm, tracker.triangles, seam_mm
     )
-    found, weights = FoundContours(**contours), fit.weights[fit.index_of(take.frames)]
-    fitted = ContourTracker(tracker, shapes, found.outer_px.shape[1], options.ridge)
-    return fitted.track(
-        take.coarse_mm, take.rotation, take.translation_mm, weights, fit.camera, found
-    )
+    # A frame whose features are not valid may have contours all the same.
+    take = replace(take, image=ImageContours(tracker, fit.camera, **contours))
+    fitted = ContourTracker(tracker, shapes, take.image.outer_px.shape[1], ridge)
+    return fitted.track(take, fit.weights[fit.index_of(take.frames)])
 
 
 def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
@@ -150,35 +134,36 @@ def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
     return sums
 
 
+def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
+    """The frames' coarse take, what each regressor makes of it, and the oracle's meshes and layers."""
+    section = CorrectionConfig(
+        integration=cfg["correction.integration"], image=cfg["correction.image"]
+    )
+    settings = CorrectionSettings.of(section, fps)
+    take = CoarseTake.load(
+        tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
+        frames, section.reach_frames(fps),
+    )  # fmt: skip
+    rows = np.searchsorted(take.frames, frames)
+    regressed = regressors(inputs, take, settings, rows)
+    return take[rows], regressed, *oracle(inputs, correspondence, take, settings, rows)
+
+
 def main(snakemake):
     inputs, out, cfg = snakemake.input, snakemake.output, snakemake.params.cfg
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     options = MeasuresConfig(**cfg["evaluation.measures"])
-    tracker, correspondence = (
-        FaceModel.load(inputs.tracker),
-        Correspondence.load(inputs.correspondence),
-    )
+    tracker = FaceModel.load(inputs.tracker)
+    correspondence = Correspondence.load(inputs.correspondence)
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    correction = CorrectionConfig(
-        integration=cfg["correction.integration"], image=cfg["correction.image"]
+    take, regressed, by_truth, true = corrected_takes(
+        inputs, tracker, fit, correspondence, cfg, frames, snakemake.params.fps
     )
-    fps = snakemake.params.fps
-    near = frames_around(frames, fit.frames, correction.reach_frames(fps))
-    around = coarse_take(inputs, tracker, fit, near, correction, fps)
-    asked_of_near = np.searchsorted(near, frames)
-    take = around[asked_of_near]
-
-    by_truth, true = oracle(inputs, correspondence, around, asked_of_near)
-    regressed = regressors(inputs, around, asked_of_near)
     contours = read_chunks(inputs.features, frames, CONTOURS)
-    baseline = contour_track(
-        inputs, tracker, fit, take, correspondence, contours,
-        ContourConfig(**cfg["evaluation.contour"]),
-    )  # fmt: skip
     sequences = {"base": take.coarse_mm} | ({} if by_truth is None else {"oracle": by_truth})
-    sequences["contour"] = baseline
+    sequences["contour"] = contour_track(inputs, tracker, fit, take, correspondence, contours, cfg)
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
     against = reference(snakemake, tracker, correspondence, frames, place)
@@ -194,10 +179,8 @@ def main(snakemake):
         layer_errors = {n: held_out.layer_errors(of, take, true) for n, of in regressed.items()}
     sums = all_sums(result, sequences, take, tracker, fit.camera, contours, layer_errors)
     save_sums(out.sums, sums, len(frames))
-    table = measure_rows(
-        sums, *place.values(), len(frames),
-        options.bootstrap_samples, options.confidence, options.seed,
-    )  # fmt: skip
+    resampling = options.bootstrap_samples, options.confidence, options.seed
+    table = measure_rows(sums, *place.values(), len(frames), *resampling)
     print(table.to_string())
     write_table(out.measures, table)
     # Apart from the measures: seconds differ from run to run, and measures must not.
@@ -206,13 +189,11 @@ def main(snakemake):
         out.seconds, [{**place, "regressor": n, "seconds_per_frame": s} for n, s in seconds.items()]
     )
     write_table(out.frames, with_layer_errors(result.table, layer_errors))
-    mouth = regions.weights["mouth"] > 0
-    count = cfg["evaluation.figures.map_frames"]
     maps = held_out.shown_arrays(
-        result, take, frames, count, against, correspondence.coarse_neutral_mm, mouth, tracker,
-        fit.camera,
+        result, take, cfg["evaluation.figures.map_frames"], against,
+        correspondence.coarse_neutral_mm, regions.weights["mouth"] > 0, tracker, fit.camera,
     )  # fmt: skip
-    save_arrays(out.maps, maps)
+    write_arrays(out.maps, compressed=True, **maps)
     reasons = ["" if ok else "not tracked, so not measured" for ok in tracked]
     rows = [QualityRow(int(f), not why, why) for f, why in zip(asked, reasons, strict=True)]
     write_quality(out.quality, *place.values(), "evaluation", rows)

@@ -9,7 +9,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.report import mesh_sheets
 from vermilion.report.figures import curves
-from vermilion.storage.arrays import load_arrays
+from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table
@@ -46,7 +46,8 @@ def with_bar(image, bar):
 
 def main(snakemake):
     cfg = FiguresConfig(**snakemake.params.cfg["evaluation.figures"])
-    shown, out, size = load_arrays(snakemake.input.maps), snakemake.output, cfg.map_size_px
+    shown, out = read_arrays(snakemake.input.maps, "file of the evaluation"), snakemake.output
+    size = cfg.map_size_px
     frames, triangles = shown["frames"], shown["triangles"]
     meshes = of_regressors(shown, "meshes_mm")
     base = meshes["base"]

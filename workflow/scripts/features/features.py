@@ -8,8 +8,9 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
 from vermilion.features.overlay import contours_overlay
 from vermilion.features.search import SearchSettings
-from vermilion.features.shape_space import head_displacement, shape_space
-from vermilion.features.vector import FeatureTable, judge
+from vermilion.features.shape_space import shape_space
+from vermilion.features.vector import FeatureTable, quality_row
+from vermilion.geometry.head_frame import head_from_world
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.storage.errors import InputError
@@ -28,12 +29,9 @@ def main(snakemake) -> None:
     fit = TrackedTake.load(snakemake.input.fit)
     rows = fit.index_of(snakemake.params.frames)
     coarse = read_sequence(snakemake.input.coarse)
-    displacement = head_displacement(
-        coarse,
-        fit.world_from_head_rotation[rows],
-        fit.world_from_head_translation_mm[rows],
-        Identity.load(snakemake.input.identity).neutral_mm,
-    )
+    poses = fit.world_from_head_rotation[rows], fit.world_from_head_translation_mm[rows]
+    neutral_mm = Identity.load(snakemake.input.identity).neutral_mm
+    displacement = head_from_world(coarse, *poses) - neutral_mm
     space = shape_space(model, shape_cfg.variance)
     print(f"{space.size} shape coefficients hold {space.kept:.2%} of the variance")
     sampler = ContourSampler.of(model, cfg.samples, SearchSettings.of(cfg))
@@ -42,14 +40,12 @@ def main(snakemake) -> None:
     contours, quality, images = [], [], []
     for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):
         path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
-        row = rows[index]
         maps = read_maps(path, frame=frame) if path.exists() else None
-        pose = (fit.world_from_head_rotation[row], fit.world_from_head_translation_mm[row])
-        pose = pose if cfg.space == "head" else None
+        pose = (poses[0][index], poses[1][index]) if cfg.space == "head" else None
         found = sampler.find(coarse[index], fit.camera, maps, pose)
-        tracked = bool(fit.valid[row])
+        tracked = bool(fit.valid[rows[index]])
         contours.append(found)
-        quality.append(judge(frame, found, tracked, maps is not None, cfg.least_found))
+        quality.append(quality_row(frame, found, tracked, maps is not None, cfg.least_found))
         if frame in shown:
             try:
                 image = source.read(snakemake.params.camera, frame)

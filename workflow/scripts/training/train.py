@@ -1,9 +1,10 @@
 """One regressor, its cross-validation curve and that curve's image."""
 
+from vermilion.config.regressors import trained_on
 from vermilion.config.training import TrainingConfig
 from vermilion.database.read import LipDatabase
 from vermilion.regression.model import save_model
-from vermilion.regression.training import Selection, curve_table, train, training_subjects
+from vermilion.regression.training import Selection, curve_table, train
 from vermilion.report.cross_validation import plot_curve
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import write_table
@@ -13,7 +14,7 @@ def main(snakemake):
     name, output = snakemake.wildcards.regressor, snakemake.output
     selection = Selection(**TrainingConfig(**snakemake.params.cfg["training"]).model_dump())
     with LipDatabase(snakemake.input.database) as database:
-        data = database.training_set(training_subjects(name, database.subjects))
+        data = database.training_set(trained_on(name, database.subjects))
         place = (
             database.feature_names, database.mask, database.area_mm2, database.topology,
             database.vertices,
