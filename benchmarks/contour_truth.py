@@ -43,6 +43,7 @@ from vermilion.features.tracked_lips import TrackedLips
 from vermilion.geometry.camera import Camera
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.errors import InputError
 from vermilion.studio.labels import contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake
@@ -176,7 +177,11 @@ def detectors_of(scene: Scene, rings: dict[int, dict | None]) -> dict[str, objec
 
 
 def measure(scene: Scene, every: int = 1) -> pd.DataFrame:
-    """A row a detector and frame without a label."""
+    """A row a detector and frame without a label.
+
+    Raises:
+        InputError: each frame has one.
+    """
     find, rings = finder(scene), scene.rings_px()
     detectors = detectors_of(scene, rings)
     width_px = float(np.median([np.ptp(loop["outer"][:, 0]) for loop in scene.loops]))
@@ -197,6 +202,10 @@ def measure(scene: Scene, every: int = 1) -> pd.DataFrame:
                 near = max(row["outer_px"], row["inner_px"]) <= FAILED_PX
                 row["failed"] = not (near and enough)
             rows.append(row)
+    if not rows:
+        raise InputError(
+            f"a label on each of every {every} frames", "frames without a label", "Lower --every."
+        )
     return pd.DataFrame(rows)
 
 
