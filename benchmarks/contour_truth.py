@@ -29,6 +29,7 @@ from benchmarks.common import add_run_arguments, print_table, timed
 from benchmarks.contours import FoundContours, search_from_landmarks
 from benchmarks.finished_run import FinishedRun
 from vermilion.config.contours import ContourDetectorConfig
+from vermilion.contours.detector import ContourDetector
 from vermilion.contours.label_offset import without_lean
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
@@ -48,6 +49,8 @@ from vermilion.studio.labels import contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake
 
+#: Outer and inner ring of the tracked lips in an image, (n, 2) px each.
+Rings = tuple[np.ndarray, np.ndarray]
 WIDTH_PX, FAILED_PX, LEAST_FOUND = 120.0, 3.0, 0.6
 
 
@@ -87,10 +90,10 @@ class Scene:
             coarse = Coarse(run.tracker_model(), run.fit(), run.coarse_mm())
         return cls(camera, images, track, loops, kinds_of(loops), labels, coarse)
 
-    def rings_px(self) -> dict[int, dict | None]:
-        """The tracked lips in each frame's image; None without a track."""
+    def rings_px(self) -> dict[int, Rings]:
+        """The tracked lips in each frame's image; none without a track."""
         if self.coarse is None:
-            return dict.fromkeys(range(len(self.loops)))
+            return {}
         lips = TrackedLips.of(self.coarse.model)
         return {f: lips.rings_px(mesh, self.camera) for f, mesh in enumerate(self.coarse.meshes_mm)}
 
@@ -156,12 +159,13 @@ def finder(scene: Scene) -> Callable:
     return lambda f, maps: search_from_landmarks(maps, points_px[f])
 
 
-def detectors_of(scene: Scene, rings: dict[int, dict | None]) -> dict[str, object]:
+def detectors_of(scene: Scene, rings: dict[int, Rings]) -> dict[str, ContourDetector]:
     """The detectors, each learnt from what the take has."""
-    detectors, labelled = {"landmarks": LandmarkRidgeDetector()}, list(scene.labels.values())
+    detectors: dict[str, ContourDetector] = {"landmarks": LandmarkRidgeDetector()}
+    labelled = list(scene.labels.values())
     if scene.coarse is not None:
         cfg = ContourDetectorConfig()
-        detectors["track"] = learn_from_take(
+        near_track = learn_from_take(
             TrackRidgeDetector(),
             sorted(evenly(np.flatnonzero(scene.track.valid).tolist(), cfg.track.frames)),
             lambda frame: scene.images.read(scene.camera.name, frame),
@@ -169,8 +173,10 @@ def detectors_of(scene: Scene, rings: dict[int, dict | None]) -> dict[str, objec
             rings.__getitem__,
             cfg.track.reach,
         )
-        limits = cfg.label_tolerance, cfg.label_reach
-        labelled, _ = without_lean(labelled, detectors["track"], rings.get, *limits)
+        if near_track is not None:
+            detectors["track"] = near_track
+            limits = cfg.label_tolerance, cfg.label_reach
+            labelled, _ = without_lean(labelled, near_track, rings.get, *limits)
     if labelled:
         detectors["boosted"] = train_detector(labelled, TrainingSettings())
     return detectors
@@ -194,7 +200,7 @@ def measure(scene: Scene, every: int = 1) -> pd.DataFrame:
         for name, detector in detectors.items():
             row = {"detector": name, "frame": frame, "kind": scene.kinds[frame], "failed": True}
             if image is not None:
-                maps = timed(partial(detector.likelihood, image, points, rings[frame]))
+                maps = timed(partial(detector.likelihood, image, points, rings.get(frame)))
                 row["maps_cpu_s"] = maps.cpu_s
                 found = find(frame, maps.result)
                 row |= distances(found, scene.loops[frame], width_px)

@@ -209,12 +209,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What is rendered, and where."""
     parser.add_argument("--folder", type=Path, required=True, help="keeps what is made")
     add_data_argument(parser)
-    path = {"type": Path, "metavar": "PATH"}
-    parser.add_argument("--archive", **path, help="ICT-FaceKit; default: the data folder's")
-    parser.add_argument("--networks", **path, help="landmark networks; default: the data folder's")
-    parser.add_argument(
-        "--recording", **path, help="Live Link Face CSV; default: the data's rom.csv"
-    )
+    for name, what in (
+        ("archive", "ICT-FaceKit; default: the data folder's"),
+        ("networks", "landmark networks; default: the data folder's"),
+        ("recording", "Live Link Face CSV; default: rom.csv of the data folder"),
+    ):
+        parser.add_argument(f"--{name}", type=Path, metavar="PATH", help=what)
     parser.add_argument("--first-row", type=int, default=2258, help="of the CSV (%(default)s)")
     parser.add_argument("--frames", type=int, default=30, help="how many (%(default)s)")
 
