@@ -1,7 +1,5 @@
 """Speed of the correction on one core: features to corrected vertices, against the bare solves.
 
-    OMP_NUM_THREADS=1 python -m benchmarks.bench_correction [--basis-error 0.03]
-
 A mesh of 40,000 vertices, a mask of about 20,000 triangles, 53 features, 3,289 training frames (the
 size of Lips16). Two regressors, the RBF network of 329 prototypes and the kernel regressor on all
 frames, whose predictions have the principal components of `SPECTRA`. For each, milliseconds a frame of
@@ -57,7 +55,7 @@ SPECTRA = {
 
 
 def sheet(n: int = 200, size_mm: float = 250.0) -> tuple[np.ndarray, np.ndarray]:
-    """A curved sheet of n * n vertices with irregular triangles."""
+    """Vertices (n * n, 3) mm and irregular triangles (T, 3) of a curved sheet."""
     axis = np.linspace(-size_mm / 2, size_mm / 2, n)
     x, y = np.meshgrid(axis, axis)
     rng = np.random.default_rng(0)
@@ -72,7 +70,7 @@ def sheet(n: int = 200, size_mm: float = 250.0) -> tuple[np.ndarray, np.ndarray]
 def fitted_model(
     kind: str, triangles: np.ndarray, mask: np.ndarray, basis_error: float
 ) -> LipModel:
-    """A regressor of the paper's size with small layers."""
+    """A regressor of the paper's size with small layers on `triangles` (T, 3), `mask` (M,) of them."""
     rng = np.random.default_rng(1)
     features = rng.normal(size=(3289, 53))
     estimator = RBFNetwork(0.1, 0.1, 10) if kind == "rbf" else KernelRegressor(0.1, 0.1)
@@ -116,7 +114,10 @@ def best_ms(actions: dict[str, tuple[Callable, int]], rounds: int = 15) -> dict[
 
 
 def peer(corrector: Corrector, coarse: np.ndarray, features: np.ndarray, triangles: np.ndarray):
-    """The same maths with NumPy and SciPy alone on eight frames, as a function to time."""
+    """The same maths with NumPy and SciPy alone on eight frames, as a function to time.
+
+    `coarse` (F, V, 3) mm, `features` (F, 53), `triangles` (T, 3) of the mesh.
+    """
     integrator, coarse, features = corrector.integrator, coarse[:8], features[:8]
     mask_triangles = triangles[corrector.model.mask]
     lu = splu(integrator.matrix)
@@ -152,36 +153,18 @@ def peer(corrector: Corrector, coarse: np.ndarray, features: np.ndarray, triangl
     return run
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--basis-error", type=float, default=0.03)
-    arguments = parser.parse_args()
-    vertices, triangles = sheet()
-    radius = np.linalg.norm(vertices[:, :2], axis=1)
-    mask = np.flatnonzero((radius < 71.6)[triangles].all(axis=1))
-    rng = np.random.default_rng(2)
-    coarse = vertices + np.sin(vertices / 20 + rng.uniform(0, 6, size=(N_FRAMES, 1, 3)))
-    features = rng.normal(size=(N_FRAMES, 53))
-    print(f"mesh {len(vertices)} vertices, mask {len(mask)} triangles")
-    for kind in SPECTRA:
-        model = fitted_model(kind, triangles, mask, arguments.basis_error)
-        take, settings = take_of(vertices, triangles, coarse, features), settings_of(10.0)
-        report(kind, Corrector(model, take, settings), take)
-    report_image(model, take, settings)
-    corrector = Corrector(model, take, settings_of(0.0))  # the peer knows no displacements
-    other = peer(corrector, coarse, features, triangles)
-    difference = np.abs(other() - corrector.correct(take[:8])).max()
-    numpy_ms = best_ms({"peer": (other, 8)}, rounds=2)["peer"]
-    print(f"peer (NumPy, SciPy SuperLU)     {numpy_ms:8.2f} ms a frame, {difference:.1e} mm apart")
-
-
 def settings_of(detail_mm: float) -> CorrectionSettings:
     """Without the image and without a filter over time."""
     return CorrectionSettings(seam_mm=16.0, detail_mm=detail_mm, smooth_frames=0, image=None)
 
 
-def take_of(vertices, triangles, coarse: np.ndarray, features: np.ndarray) -> CoarseTake:
-    """Heads that stand still at the origin of the world."""
+def take_of(
+    vertices: np.ndarray, triangles: np.ndarray, coarse: np.ndarray, features: np.ndarray
+) -> CoarseTake:
+    """Heads that stand still at the origin of the world.
+
+    `vertices` (V, 3) and `coarse` (F, V, 3) in mm, `triangles` (T, 3), `features` (F, 53).
+    """
     n = len(coarse)
     pose = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     valid = np.ones(n, dtype=bool)
@@ -213,7 +196,10 @@ def report(kind: str, corrector: Corrector, take: CoarseTake) -> None:
 
 
 def mouth_on(vertices: np.ndarray, triangles: np.ndarray) -> FaceModel:
-    """A closed mouth drawn on the sheet: contours, lips and eyes where a face has them."""
+    """A closed mouth drawn on the sheet: contours, lips and eyes where a face has them.
+
+    `vertices` (V, 3) mm and `triangles` (T, 3) are those of the sheet.
+    """
     graph = edge_graph(vertices, triangles)
     x, y = vertices[:, 0], vertices[:, 1]
 
@@ -266,7 +252,7 @@ def report_image(model: LipModel, take: CoarseTake, settings: CorrectionSettings
     )
     print("\nwith the image: pose, 160 contour points, contact (nothing touches)")
     print(f"features to vertices            {ms['whole']:8.2f} ms a frame (bar 15)")
-    print(f"  without the image           {ms['base']:8.2f}")
+    print(f"  without the image             {ms['base']:8.2f}")
 
 
 def right_sides(corrector: Corrector) -> Callable:
@@ -280,5 +266,29 @@ def right_sides(corrector: Corrector) -> Callable:
     return lambda: accumulate_mixture(*triangles, basis, lanes, *series, right)
 
 
-if __name__ == "__main__":
-    main()
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """How far the basis of layers is cut."""
+    parser.add_argument(
+        "--basis-error", type=float, default=0.03, help="training.basis_error (%(default)s)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure and print."""
+    vertices, triangles = sheet()
+    radius = np.linalg.norm(vertices[:, :2], axis=1)
+    mask = np.flatnonzero((radius < 71.6)[triangles].all(axis=1))
+    rng = np.random.default_rng(2)
+    coarse = vertices + np.sin(vertices / 20 + rng.uniform(0, 6, size=(N_FRAMES, 1, 3)))
+    features = rng.normal(size=(N_FRAMES, 53))
+    print(f"mesh {len(vertices)} vertices, mask {len(mask)} triangles")
+    for kind in SPECTRA:
+        model = fitted_model(kind, triangles, mask, arguments.basis_error)
+        take, settings = take_of(vertices, triangles, coarse, features), settings_of(10.0)
+        report(kind, Corrector(model, take, settings), take)
+    report_image(model, take, settings)
+    corrector = Corrector(model, take, settings_of(0.0))  # the peer knows no displacements
+    other = peer(corrector, coarse, features, triangles)
+    difference = np.abs(other() - corrector.correct(take[:8])).max()
+    numpy_ms = best_ms({"peer": (other, 8)}, rounds=2)["peer"]
+    print(f"peer (NumPy, SciPy SuperLU)     {numpy_ms:8.2f} ms a frame, {difference:.1e} mm apart")

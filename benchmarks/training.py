@@ -1,6 +1,4 @@
-"""Speed of training at the paper's size, against scikit-learn's grid search.
-
-    OMP_NUM_THREADS=1 python -m benchmarks.bench_training [--regressor kernel] [--peer]
+"""Speed of training at the size of Lips16, against scikit-learn's grid search.
 
 3,289 frames of four people, 53 features, 27,000 outputs (3,000 triangles), 25 grid points, 5 folds
 grouped by clip. Prints seconds and the largest memory. Bars: 60 s and 2 GB. With `--peer`, the time
@@ -10,13 +8,12 @@ of one of the 125 fits of `GridSearchCV` over `KernelRidge` on the same data, an
 from __future__ import annotations
 
 import argparse
-import resource
-import time
 
 import numpy as np
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.model_selection import GroupKFold
 
+from benchmarks.common import peak_gb, timed
 from vermilion.regression.cross_validation import clips_of
 from vermilion.regression.training import Selection, train
 from vermilion.regression.training_set import TrainingSet
@@ -49,40 +46,43 @@ def paper_sized_data() -> TrainingSet:
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+def one_peer_fit(data: TrainingSet, selection: Selection) -> float:
+    """Score of scikit-learn's kernel ridge regression on the first fold."""
+    clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
+    rows, held = next(GroupKFold(selection.folds).split(clips, groups=clips))
+    peer = KernelRidge(alpha=0.1, kernel="rbf", gamma=0.002)
+    peer.fit(data.features[rows], data.layers[rows])
+    return peer.score(data.features[held], data.layers[held])
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which regressor, against what."""
     parser.add_argument("--regressor", choices=["rbf", "kernel"], default="rbf")
     parser.add_argument("--peer", action="store_true", help="time scikit-learn as well")
-    arguments = parser.parse_args()
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure and print."""
     data = paper_sized_data()
     names = [f"shape_{k}" for k in range(33)] + [f"outer_{k}" for k in range(20)]
     alphas, betas = (1e-3, 1e-2, 1e-1, 1.0, 10.0), (0.03, 0.1, 0.3, 1.0, 3.0)
     selection = Selection(
         arguments.regressor, alphas=alphas, betas=betas, kernel_alphas=alphas, kernel_betas=betas
     )
-    start = time.perf_counter()
-    model, curve = train(
-        "MS", data, names, np.arange(N_TRIANGLES), np.ones(N_TRIANGLES), "", np.arange(0), selection
+    triangles, weights = np.arange(N_TRIANGLES), np.ones(N_TRIANGLES)
+    training = timed(
+        lambda: train("MS", data, names, triangles, weights, "", np.arange(0), selection)
     )
-    seconds = time.perf_counter() - start
-    memory_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(f"{curve.mean.size} grid points, {len(curve.frames)} folds, ", end="")
+    memory_gb = peak_gb()
+    model, curve = training.result
     activations, rank = model.estimator.coefficients_.shape
-    print(f"{activations} activations, a basis of {rank} layers")
-    print(f"training          {seconds:8.1f} s (bar 60)")
+    print(
+        f"{curve.mean.size} grid points, {len(curve.frames)} folds, "
+        f"{activations} activations, a basis of {rank} layers"
+    )
+    print(f"training          {training.wall_s:8.1f} s (bar 60)")
     print(f"largest memory    {memory_gb:8.2f} GB with the data (bar 2)")
     if arguments.peer:
-        clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
-        rows, held = next(GroupKFold(selection.folds).split(clips, groups=clips))
-        start = time.perf_counter()
-        peer = KernelRidge(alpha=0.1, kernel="rbf", gamma=0.002)
-        peer.fit(data.features[rows], data.layers[rows]).score(
-            data.features[held], data.layers[held]
-        )
-        one = time.perf_counter() - start
+        one = timed(lambda: one_peer_fit(data, selection)).wall_s
         print(f"KernelRidge       {one:8.1f} s a fit and score, {126 * one:.0f} s in GridSearchCV")
-        print(f"faster by         {126 * one / seconds:8.1f} (bar 20)")
-
-
-if __name__ == "__main__":
-    main()
+        print(f"faster by         {126 * one / training.wall_s:8.1f} (bar 20)")

@@ -1,6 +1,4 @@
-"""Accuracy and speed of the contour detectors, against named alternatives, on labelled frames.
-
-    python -m benchmarks.bench_contours [data folder]
+"""Accuracy and speed of the contour detectors on labelled frames, against named alternatives.
 
 The `phone` take of the sample capture: detectors are trained on four labelled frames and measured
 on the two others. Landmarks are those of the networks in the data folder. Prints, per detector,
@@ -16,15 +14,16 @@ seconds of training, and CPU seconds a frame for both maps.
 
 from __future__ import annotations
 
-import sys
-import time
+import argparse
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 from sklearn.ensemble import HistGradientBoostingClassifier
 
+from benchmarks.common import add_data_argument, print_table, timed
 from vermilion.contours import training
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
 from vermilion.contours.curves import loop_spline
@@ -51,6 +50,7 @@ class PeerDetector:
     settings: TrainingSettings
 
     def likelihood(self, linear_rgb, landmarks_px):
+        """The (inner, outer) maps (h, w) of an image (h, w, 3) with landmarks (66, 2) px."""
         region = mouth_region(landmarks_px, self.settings.interocular_size_px, self.settings.margin)
         integrals = integral_images(image_channels(region.crop(linear_rgb)))
         rows, columns = np.nonzero(region.mask)
@@ -64,6 +64,7 @@ class PeerDetector:
 
 
 def train_peer(frames, settings: TrainingSettings, n_features: int = 300) -> PeerDetector:
+    """Train it on labelled frames."""
     random = np.random.default_rng(0)
     examples = [e for frame in frames for e in training._examples(frame, settings, random)]
     pool = random_pool(n_features, len(CHANNELS), settings.patch_px, random)
@@ -90,27 +91,40 @@ def train_peer(frames, settings: TrainingSettings, n_features: int = 300) -> Pee
     return PeerDetector(pool, models, settings)
 
 
-def contour_error_px(detector, frame: LabelledFrame) -> tuple[dict[str, float], float]:
-    """Mean distance of the found rings at a mouth width of 120 px, and CPU seconds of the maps."""
-    start = time.process_time()
-    inner_map, outer_map = detector.likelihood(frame.linear_rgb, frame.landmarks_px)
-    seconds = time.process_time() - start
-    unit, settings = float(interocular_px(frame.landmarks_px)), SearchSettings()
-    ring = loop_spline(frame.landmarks_px[LIP_OUTER], 80)
-    outer = find_outer(outer_map, ring, unit, settings)
-    lips = loop_spline(frame.landmarks_px[LIP_INNER], 80) - ring
-    inner = find_inner(inner_map, outer.points, lips, unit, settings)
+@dataclass(frozen=True)
+class FoundContours:
+    """Contours of a frame (n, 2) px, and which points met a maximum, (n,) bool."""
+
+    outer_px: np.ndarray
+    inner_px: np.ndarray
+    outer_found: np.ndarray
+    inner_found: np.ndarray
+
+
+def search_from_landmarks(maps, points_px: np.ndarray) -> FoundContours:
+    """Contours in the (inner, outer) maps of a frame from its landmarks `points_px` (66, 2)."""
+    unit, settings = float(interocular_px(points_px)), SearchSettings()
+    start = loop_spline(points_px[LIP_OUTER], 80)
+    lips = loop_spline(points_px[LIP_INNER], 80) - start
+    outer = find_outer(maps[1], start, unit, settings)
+    inner = find_inner(maps[0], outer.points, lips, unit, settings)
+    return FoundContours(outer.points, inner.points, outer.found, inner.found)
+
+
+def errors_px(found: FoundContours, frame: LabelledFrame) -> dict[str, float]:
+    """Mean distance of the found contours to the labelled ones at a mouth width of 120 px."""
     scale = 120.0 / np.ptp(frame.label.outer.points_px[:, 0])
-    ends = frame.label.inner.points_px[:, 0]
-    between = (inner.points[:, 0] > ends.min()) & (inner.points[:, 0] < ends.max())
+    ends, across = frame.label.inner.points_px[:, 0], found.inner_px[:, 0]
+    between = (across > ends.min()) & (across < ends.max())
     errors = {}
-    for name, points in (("outer", outer.points), ("inner", inner.points[between])):
+    for name, points in (("outer", found.outer_px), ("inner", found.inner_px[between])):
         line = getattr(frame.label, name).dense(0.2)
-        errors[name] = float(cKDTree(line).query(points)[0].mean() * scale)
-    return errors, seconds
+        errors[f"{name}_px"] = float(cKDTree(line).query(points)[0].mean() * scale)
+    return errors
 
 
 def labelled_frames(data: Path) -> dict[int, LabelledFrame]:
+    """Frame number -> labelled frame of the sample capture's `phone` take."""
     capture = data / "capture-sample/captures/p1/phone"
     landmarks = NetworkDetector(data / "landmarks66")
     source, frames = open_frames(capture), {}
@@ -122,9 +136,14 @@ def labelled_frames(data: Path) -> dict[int, LabelledFrame]:
     return frames
 
 
-def main() -> None:
-    data = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("../shared/data")
-    frames = labelled_frames(data)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is read."""
+    add_data_argument(parser)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure and print."""
+    frames = labelled_frames(arguments.data)
     train = [frame for number, frame in frames.items() if number not in HELD_OUT]
     settings = TrainingSettings()
     makers = {
@@ -134,20 +153,17 @@ def main() -> None:
         "scikit-learn": lambda: train_peer(train, settings),
     }
     train_detector(train[:1], TrainingSettings(variants=1, n_features=64))  # compiles
-    print("detector\tframe\touter_px\tinner_px\ttraining_s\tmaps_cpu_s")
+    rows = []
     for name, make in makers.items():
-        start = time.perf_counter()
-        detector = make()
-        trained = time.perf_counter() - start
+        fitted = timed(make)
         for number in HELD_OUT:
-            contour_error_px(detector, frames[number])
-            errors, seconds = contour_error_px(detector, frames[number])
-            print(
-                f"{name}\t{number}\t{errors['outer']:.2f}\t{errors['inner']:.2f}\t"
-                f"{trained:.1f}\t{seconds:.3f}",
-                flush=True,
+            frame = frames[number]
+            task = partial(fitted.result.likelihood, frame.linear_rgb, frame.landmarks_px)
+            maps = timed(task, warm_up=True)
+            found = search_from_landmarks(maps.result, frame.landmarks_px)
+            rows.append(
+                {"detector": name, "frame": number}
+                | errors_px(found, frame)
+                | {"training_s": fitted.wall_s, "maps_cpu_s": maps.cpu_s}
             )
-
-
-if __name__ == "__main__":
-    main()
+    print_table(rows, {"training_s": 1, "maps_cpu_s": 3})

@@ -1,0 +1,88 @@
+"""Accuracy and speed of the relief from shading on a known bump, against SciPy's SuperLU.
+
+A dome of 161 x 161 vertices under known light, with noise of one display value. Prints how far normals
+are from the true ones near the bump (smooth mesh, relief), CPU seconds of the relief of a frame and of
+the combination of normals and positions (Nehab 2005), each with our factorisation and with SuperLU in
+its place, the ratios of these, and the peak memory of the process.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
+import numpy as np
+from scipy.sparse.linalg import splu
+
+from benchmarks.common import peak_gb, print_table, timed
+from tests.unit import test_shading_refinement as scenes
+from vermilion.detail.relief import combine, relief, short_range
+from vermilion.detail.relief.sight import Sight
+from vermilion.geometry.mesh import triangle_normals, vertex_normals
+
+SIDE = 161
+
+
+class SuperLU:
+    """SciPy's factorisation behind the interface of ours."""
+
+    def __init__(self, matrix):
+        self.solve = splu(matrix.tocsc()).solve
+
+
+@contextmanager
+def factorising_with(factor: type) -> Iterator[None]:
+    """Put another factorisation in place of ours."""
+    ours = relief.CholeskyFactor
+    try:
+        for module in (relief, short_range, combine):
+            module.CholeskyFactor = factor
+        yield
+    finally:
+        for module in (relief, short_range, combine):
+            module.CholeskyFactor = ours
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Nothing to choose."""
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Measure and print."""
+    scenes.SIDE = SIDE
+    topology, points = scenes.dome()
+    light, n = scenes.clip(topology, noise=1), len(topology.skin)
+    normals = vertex_normals(points, topology.skin)
+    moved = points + scenes.bump(points)[:, None] * normals
+    true = vertex_normals(moved, topology.skin)
+    grain = np.random.default_rng(0).normal(size=(n, 1))
+    shown = triangle_normals(moved, topology.skin) @ scenes.FACING.T
+    smooth = triangle_normals(points, topology.skin) @ scenes.FACING.T
+    sight = Sight(light.values(shown) + grain, np.ones(n), smooth)
+    settings = relief.ReliefSettings(detail_mm=20.0)
+    near = np.hypot(points[:, 0] - 5, points[:, 1]) < 12
+    rows = []
+    for name, factor in (("ours (cholespy)", relief.CholeskyFactor), ("SuperLU", SuperLU)):
+        with factorising_with(factor):
+            solve = timed(
+                partial(
+                    relief.solve_relief, points, scenes.FACING, sight, light, topology, settings
+                ),
+                warm_up=True,
+            )
+            after = vertex_normals(points + solve.result[:, None] * normals, topology.skin)
+            join = timed(
+                partial(combine.combine, points, normals, after, topology, 0.1, solve.result),
+                warm_up=True,
+            )
+        rows.append({"factor": name, "relief s": solve.cpu_s, "combination s": join.cpu_s})
+    for row in rows:
+        for part in ("relief", "combination"):
+            row[f"{part} ratio"] = row[f"{part} s"] / rows[-1][f"{part} s"]
+    print_table(rows)
+    before_deg = scenes.degrees_apart(normals, true)[near].mean()
+    after_deg = scenes.degrees_apart(after, true)[near].mean()
+    print(f"normals: smooth {before_deg:.2f} degrees off, with relief {after_deg:.2f}")
+    print(f"peak memory {peak_gb():.2f} GB")
