@@ -27,6 +27,7 @@ from benchmarks.finished_run import FinishedRun
 from vermilion.appearance.estimate import Appearance
 from vermilion.config.tracking import TrackingConfig
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import vertex_normals
