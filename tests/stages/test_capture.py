@@ -95,7 +95,7 @@ def test_a_video_is_hashed_once_and_its_rate_held_against_the_sheet(tmp_path):
         tmp_path / "clip.mp4", frames, prepare=lambda stream: stream.set_display_rotation(-90)
     )
     facts = tmp_path / "video.json"
-    run_script("video_facts", input={0: turned}, output={0: facts}, log=tmp_path / "log")
+    run_script("capture/video_facts", input={0: turned}, output={0: facts}, log=tmp_path / "log")
     for first, last, fps in ((0, 3, 30.0), (4, 7, None)):
         chunk = f"{first:06d}-{last:06d}"
         run_script(
