@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import sparse
+from vermilion.geometry.mesh_points import MeshPoints
 
 from tests.unit import guided_mouths as mouths
 from vermilion.correction.constraints import Rows
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.geometry.mesh import vertex_normals
-from vermilion.geometry.mesh_points import MeshPoints
 from vermilion.geometry.raycast import RayCaster
 from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.refinement import SMOOTH, RefinementSettings, SketchRefiner, View, ray_rows
