@@ -4,6 +4,7 @@ CONFIG ?= config/config.yaml
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+LANDMARKS := $(VENV)-mediapipe.ready
 RESULTS = $$($(BIN)/python -c 'import sys, yaml; print(yaml.safe_load(open(sys.argv[1])).get("results", "results/demo"))' $(CONFIG))
 
 .PHONY: help setup demo run report verify test test-quick lint format docs clean
@@ -17,16 +18,21 @@ help:
 	@echo "make docs        regenerate the configuration reference and schemas"
 	@echo "make clean       remove the environment and caches (results stay)"
 
-setup: $(READY)
+setup: $(READY) $(LANDMARKS)
 
 $(READY): requirements.lock pyproject.toml tools/setup.sh
 	tools/setup.sh $(VENV) $(PYTHON)
 	@touch $@
 
+# Optional: where it cannot be made, the script says why and the rest works without.
+$(LANDMARKS): requirements.mediapipe.lock tools/setup_landmarks.sh | $(READY)
+	tools/setup_landmarks.sh $(VENV)-mediapipe $(PYTHON)
+	@touch $@
+
 demo: CONFIG = config/config.yaml
 demo: run
 
-run: $(READY)
+run: setup
 	@$(BIN)/python -m vermilion.app.run $(CONFIG) --quiet rules reason host
 
 report: $(READY)
@@ -38,7 +44,7 @@ verify: $(READY)
 test: test-quick
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m slow
 
-test-quick: $(READY)
+test-quick: setup
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 lint: $(READY)
@@ -57,5 +63,5 @@ docs: $(READY)
 	$(BIN)/python -m vermilion.config.reference
 
 clean:
-	rm -rf $(VENV) .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	rm -rf $(VENV) $(VENV)-mediapipe* .snakemake .pytest_cache .ruff_cache src/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -15,9 +15,9 @@ def contour_labels(wildcards):
 def tracked_lips(wildcards):
     """The track of a take whose contours start from it, or whose labels are held against it.
 
-    Of the job's chunk, or of all.
+    Of the job's chunk, or of all. Lips of dense landmarks serve better.
     """
-    if CONFIG.contours.detector.kind in ("boosted", "landmarks"):
+    if CONFIG.contours.detector.kind in ("boosted", "landmarks") or dense_landmarks():
         return {}
     parts = [wildcards.chunk] if "chunk" in wildcards.keys() else chunks(wildcards)
     return {

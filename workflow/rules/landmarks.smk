@@ -1,26 +1,55 @@
-"""66 landmarks a frame (Mono13 5): by a trained regressor, by networks, or from files.
+"""Landmarks of every frame (Mono13 5): by networks, by a trained regressor, or from files.
 
 With `landmarks.correction.mode: flow` these are landmarks/raw/{chunk}.npz; key frames are chosen
 among them (landmarks/key_frames.npz), and between these flow corrects (landmarks/{chunk}.npz).
 """
 
+from vermilion.storage.errors import InputError
+from vermilion.landmarks.choose import usable_kind
 from vermilion.landmarks.labels import label_files
 from vermilion.landmarks.networks import FACE_FILE, LANDMARK_FILE
 
 DETECTED = P.landmarks_folder + ("" if CONFIG.landmarks.correction.mode == "raw" else "/raw")
 
+#: The kind of detector that runs: the configured one, or what takes its place on this machine.
+try:
+    DETECTOR, _INSTEAD = usable_kind(
+        CONFIG.landmarks.detector,
+        CONFIG.landmarks.mediapipe.environment,
+        CONFIG.landmarks.models,
+        bool(CONFIG.landmarks.training_takes),
+    )
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+if _INSTEAD and IS_MAIN_PROCESS:
+    print(_INSTEAD, file=sys.stderr)
+
+
+def dense_landmarks():
+    """Whether the landmarks of a take have dense lips: flow corrects the 66 points alone."""
+    return DETECTOR == "mediapipe" and CONFIG.landmarks.correction.mode == "raw"
+
+
+def detector_cfg(*more):
+    """Keys of the configuration that a rule with a detector reads."""
+    return {
+        **cfg_of("landmarks.detector", "landmarks.networks", *more),
+        "landmarks.detector": DETECTOR,
+    }
+
 
 def detector_files(wildcards):
-    """What the configured detector reads: its model or networks; nothing for CSV files."""
-    kind, folder = CONFIG.landmarks.detector, Path(CONFIG.landmarks.models)
-    if kind == "onnx":
+    """What the detector reads: its model or networks; nothing for CSV files and mediapipe."""
+    folder = Path(CONFIG.landmarks.models)
+    if DETECTOR == "onnx":
         return [str(folder / FACE_FILE), str(folder / LANDMARK_FILE)]
-    return [P.landmark_model] if kind == "trained" else []
+    return [P.landmark_model] if DETECTOR == "trained" else []
 
 
 def detector_path(wildcards):
-    """The folder of networks or the file of the regressor."""
-    return CONFIG.landmarks.models if CONFIG.landmarks.detector == "onnx" else P.landmark_model
+    """The environment, the folder of networks or the file of the regressor."""
+    paths = {"mediapipe": CONFIG.landmarks.mediapipe.environment, "onnx": CONFIG.landmarks.models}
+    return paths.get(DETECTOR, P.landmark_model)
 
 
 def landmark_csv(wildcards, camera):
@@ -31,7 +60,7 @@ def landmark_csv(wildcards, camera):
 
 
 def landmark_csv_input(wildcards):
-    if CONFIG.landmarks.detector != "csv":
+    if DETECTOR != "csv":
         return []
     return landmark_csv(wildcards, mono_camera(wildcards))
 
@@ -125,7 +154,7 @@ rule landmarks:
         mem_mb=1000,
         runtime=60,
     params:
-        cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
+        cfg=detector_cfg("landmarks.csv"),
         code=code_of("landmarks/landmarks"),
         source=chunk_source,
         camera=mono_camera,
@@ -206,7 +235,7 @@ rule landmarks_views:
         mem_mb=1000,
         runtime=30,
     params:
-        cfg=cfg_of("landmarks.detector", "landmarks.networks", "landmarks.csv"),
+        cfg=detector_cfg("landmarks.csv"),
         code=code_of("landmarks/landmarks_views"),
         source=source_of,
         frame=first_frame,

@@ -33,9 +33,7 @@ rule scan:
     params:
         cfg=lambda wildcards: {
             "scan": scan_of(wildcards).model_dump(mode="json"),
-            **cfg_of(
-                "landmarks.detector", "landmarks.networks", "face_model.template_slight_open"
-            ),
+            **detector_cfg("face_model.template_slight_open"),
         },
         code=code_of("scan/scan"),
         model=detector_path,

@@ -66,7 +66,7 @@ def evaluation_outputs():
 
 def all_outputs():
     """All that a finished run has."""
-    landmark_model = [P.landmark_model] if CONFIG.landmarks.detector == "trained" else []
+    landmark_model = [P.landmark_model] if DETECTOR == "trained" else []
     return [
         *studio_outputs(),
         P.tracker,

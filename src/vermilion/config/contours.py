@@ -117,6 +117,14 @@ class ContourDetectorConfig(StageConfig):
         description="`landmarks`: how far from the landmarks the lips' border is looked for (per "
         "inter-ocular distance; the outer one half as far again).",
     )
+    lips_reach: float = Field(
+        0.02,
+        gt=0,
+        le=0.3,
+        description="`track`, `landmarks`: how far from the lips of dense landmarks (detector `mediapipe`) "
+        "the inner border is looked for (per inter-ocular distance). Where there are such lips, both start "
+        "from them, and `ridge_reach` and `track.inner_reach` do not count.",
+    )
     edge_weight: float = Field(
         4.0,
         ge=0,

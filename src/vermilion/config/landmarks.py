@@ -27,6 +27,16 @@ class NetworksConfig(StageConfig):
     )
 
 
+class MediapipeConfig(StageConfig):
+    """The attention mesh of mediapipe (`detector: mediapipe`)."""
+
+    environment: str = Field(
+        ".venv-mediapipe",
+        min_length=1,
+        description="Folder of the virtual environment that tools/setup_landmarks.sh makes.",
+    )
+
+
 class LandmarkFilesConfig(StageConfig):
     """Landmarks of another tracker, a CSV a take (`detector: csv`)."""
 
@@ -145,21 +155,26 @@ class LandmarkCorrectionConfig(StageConfig):
 
 
 class LandmarksConfig(StageConfig):
-    """66 landmarks a frame (Mono13 5)."""
+    """Landmarks of every frame (Mono13 5)."""
 
-    detector: Literal["trained", "onnx", "csv"] = Field(
+    detector: Literal["mediapipe", "trained", "onnx", "csv"] = Field(
         "trained",
-        description="`trained`: the embedded regressor, trained on `training_takes`. `onnx`: the "
-        "networks in `models`. `csv`: files of another tracker.",
+        description="`mediapipe`: the attention mesh of mediapipe, 478 points, for real faces; needs "
+        "the environment in `mediapipe`, and without it gives way to `onnx` where `models` is named, "
+        "else to `trained`. `trained`: the embedded regressor, trained on `training_takes`. `onnx`: "
+        "the networks in `models`. `csv`: files of another tracker.",
+    )
+    mediapipe: MediapipeConfig = Field(
+        default_factory=MediapipeConfig, description="The attention mesh of mediapipe."
     )
     models: str = Field(
         "",
-        description="`onnx` only: folder with OpenSeeFace's mnv3_detection_opt.onnx and "
+        description="`onnx`, or in place of `mediapipe`: folder with OpenSeeFace's mnv3_detection_opt.onnx and "
         "lm_model0_opt.onnx.",
     )
     training_takes: list[str] = Field(
         default_factory=list,
-        description="`trained` only: takes (subject/take) whose captures hold labels/landmarks/.",
+        description="`trained`, or in place of `mediapipe`: takes (subject/take) whose captures hold labels/landmarks/.",
     )
     networks: NetworksConfig = Field(
         default_factory=NetworksConfig, description="The ONNX networks."

@@ -61,7 +61,7 @@ class Configuration(StageConfig):
         default_factory=InpaintConfig, description="Removal of the lip tattoo (Lips16 3.2.1)."
     )
     landmarks: LandmarksConfig = Field(
-        default_factory=LandmarksConfig, description="66 landmarks a frame (Mono13 5)."
+        default_factory=LandmarksConfig, description="Landmarks of every frame (Mono13 5)."
     )
     tracking: TrackingConfig = Field(
         default_factory=TrackingConfig, description="The coarse monocular track (Lips16 3.2)."

@@ -25,8 +25,10 @@ class ContourDetector(ABC):
 
     #: What the file calls it.
     kind: ClassVar[str]
-    #: Whether it starts from the tracked lips, and not from the landmarks'.
+    #: Whether it needs rings of the lips to start from: of the track, or of dense landmarks.
     from_track: ClassVar[bool] = False
+    #: Whether it starts from such rings where there are any.
+    takes_rings: ClassVar[bool] = False
     interocular_size_px: float
     margin: float
 
@@ -38,7 +40,7 @@ class ContourDetector(ABC):
         Args:
             landmarks_px: (66, 2); lips_px: as in `likelihood`.
         """
-        lips = lips_px if self.from_track else None
+        lips = lips_px if self.takes_rings else None
         return mouth_region(landmarks_px, self.interocular_size_px, self.margin, lips_px=lips)
 
     def likelihood(
@@ -52,7 +54,8 @@ class ContourDetector(ABC):
         Args:
             linear_rgb: (h, w, 3) float32 image.
             landmarks_px: (66, 2) of the face in it.
-            lips_px: rings (n, 2), outer and inner, of the tracked lips (`features.tracked_lips`).
+            lips_px: rings (n, 2), outer and inner, of the tracked lips (`features.tracked_lips`) or of
+                dense landmarks (`contours.landmark_rings`).
         """
         region = self.region(landmarks_px, lips_px)
         maps = self.region_likelihood(region.crop(linear_rgb), region)

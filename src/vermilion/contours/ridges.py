@@ -91,6 +91,8 @@ class RidgeDetector(ContourDetector):
         stiffness: cost of a slope of 1 of the moved ring against the start, squared.
     """
 
+    takes_rings = True
+
     interocular_size_px: float = 200.0
     margin: float = 0.16
     width: float = 0.008

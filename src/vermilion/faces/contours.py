@@ -93,6 +93,28 @@ def _spline(knots: np.ndarray) -> np.ndarray:
     return CubicSpline(chord, knots, bc_type="natural")(places)
 
 
+def contour_halves(
+    neutral_mm: np.ndarray, landmarks: np.ndarray, loop: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A lip contour, which may start anywhere and run either way, as two open vertex paths.
+
+    Returns:
+        the upper lip's path from the subject's right corner to the left, and the lower lip's back from
+        the left corner to the right; both corners are in both.
+    """
+    points = neutral_mm[loop]
+    right, left = (
+        int(np.argmin(np.linalg.norm(points - neutral_mm[landmarks[corner]], axis=1)))
+        for corner in (RIGHT_CORNER, LEFT_CORNER)
+    )
+    loop, points = np.roll(loop, -right), np.roll(points, -right, axis=0)
+    turn = (left - right) % len(loop)
+    if points[1:turn, 1].mean() < points[turn + 1 :, 1].mean():  # the lower lip comes first
+        loop = np.roll(loop[::-1], 1)
+        turn = len(loop) - turn
+    return loop[: turn + 1], np.append(loop[turn:], loop[0])
+
+
 def geodesic_distance(graph: sparse.spmatrix, sources: np.ndarray) -> np.ndarray:
     """Distance along edges of every vertex to the nearest source, (V,) mm; inf where apart."""
     return csgraph.dijkstra(graph, indices=np.unique(sources), min_only=True)

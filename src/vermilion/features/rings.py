@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
+from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
 
 
@@ -45,17 +45,7 @@ def lip_rings(model: FaceModel, n_samples: int) -> tuple[Ring, Ring]:
 
 
 def _ring(model: FaceModel, loop: np.ndarray, n_samples: int) -> Ring:
-    points = model.neutral_mm[loop]
-    right, left = (
-        int(np.argmin(np.linalg.norm(points - model.neutral_mm[model.landmarks[corner]], axis=1)))
-        for corner in (RIGHT_CORNER, LEFT_CORNER)
-    )
-    loop, points = np.roll(loop, -right), np.roll(points, -right, axis=0)
-    turn = (left - right) % len(loop)
-    if points[1:turn, 1].mean() < points[turn + 1 :, 1].mean():  # the lower lip comes first
-        loop = np.roll(loop[::-1], 1)
-        turn = len(loop) - turn
-    halves = [loop[: turn + 1], np.append(loop[turn:], loop[0])]
+    halves = contour_halves(model.neutral_mm, model.landmarks, loop)
     parts = [_along(model.neutral_mm, half, n_samples // 2) for half in halves]
     return Ring(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 

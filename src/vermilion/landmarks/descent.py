@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
 from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
+from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import ModelFileError
 
@@ -96,6 +98,8 @@ class DescentDetector:
         locator: finds where to start.
         found_threshold: least mean confidence.
     """
+
+    landmark_set: ClassVar[LandmarkSet] = IBUG66
 
     mean: np.ndarray
     steps: np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
-from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
+from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.progress import progress
@@ -19,13 +19,16 @@ NOT_FOUND = "no face found"
 
 
 def detect_frames(
-    find: Callable[[int], Landmarks], frames: Sequence[int]
+    find: Callable[[int], Landmarks],
+    frames: Sequence[int],
+    landmark_set: LandmarkSet = IBUG66,
 ) -> tuple[LandmarkTrack, list[QualityRow]]:
     """Landmarks of some frames, and a quality row each.
 
     Args:
         find: landmarks of a frame; may raise InputError, which flags the frame.
         frames: frame numbers.
+        landmark_set: the set that `find` gives.
     """
     entries, rows = [], []
     for frame in progress(frames, "landmarks"):
@@ -33,7 +36,7 @@ def detect_frames(
         try:
             entry = find(frame)
         except InputError as error:
-            entry, reason = Landmarks.none(), str(error)
+            entry, reason = Landmarks.none(landmark_set), str(error)
         confidence = {"confidence": round(float(entry.confidence.mean()), 4)}
         rows.append(QualityRow(frame, entry.found, "" if entry.found else reason, confidence))
         entries.append(entry)
@@ -59,7 +62,12 @@ def landmark_overlay(
             image = to_display(source.read(camera, frame))
         except InputError:
             image = np.zeros((240, 320, 3), dtype=np.uint8)
-        found = Landmarks(track.points_px[row], track.confidence[row], bool(track.valid[row]))
+        found = Landmarks(
+            track.points_px[row],
+            track.confidence[row],
+            bool(track.valid[row]),
+            track.landmark_set,
+        )
         text = f"{frame}" if found.found else f"{frame}: {NOT_FOUND}"
         images.append(label(draw_landmarks(image, found), text))
     return tile(images, columns)
@@ -69,8 +77,9 @@ def draw_landmarks(image: np.ndarray, found: Landmarks) -> np.ndarray:
     """A copy of (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
     if not found.found:
         return image
-    radius = max(1, round(image.shape[1] / 400))
-    for loop in (LIP_OUTER, LIP_INNER):
+    dense = found.landmark_set is not IBUG66  # large points would hide the face
+    radius = 1 if dense else max(1, round(image.shape[1] / 400))
+    for loop in (found.landmark_set.lip_outer, found.landmark_set.lip_inner):
         image = draw_polyline(image, found.points_px[loop], (255, 255, 0))
     sure = found.confidence >= 0.5
     image = draw_points(image, found.points_px[sure], (0, 255, 0), radius)

@@ -9,8 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from vermilion.landmarks.scheme import N_LANDMARKS
+from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
 from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -18,23 +19,39 @@ class Landmarks:
     """The landmarks of one face in one image.
 
     Attributes:
-        points_px: (66, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
-        confidence: (66,) float64 in [0, 1].
+        points_px: (N, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
+        confidence: (N,) float64 in [0, 1].
         found: whether a face was found; if not, the points are NaN and the confidence zero.
+        landmark_set: what the N points are.
+        depth_px: (N,) away from the camera, for detectors that tell it; else None.
     """
 
     points_px: np.ndarray
     confidence: np.ndarray
     found: bool
+    landmark_set: LandmarkSet = IBUG66
+    depth_px: np.ndarray | None = None
 
     @classmethod
-    def none(cls) -> Landmarks:
+    def none(cls, landmark_set: LandmarkSet = IBUG66) -> Landmarks:
         """No face."""
-        return cls(np.full((N_LANDMARKS, 2), np.nan), np.zeros(N_LANDMARKS), False)
+        n_points = landmark_set.n_points
+        return cls(np.full((n_points, 2), np.nan), np.zeros(n_points), False, landmark_set)
+
+    def as_ibug66(self) -> Landmarks:
+        """The 66 points of `ibug66` alone."""
+        ids = self.landmark_set.ibug66
+        return Landmarks(self.points_px[ids], self.confidence[ids], self.found)
 
 
 class LandmarkDetector(Protocol):
-    """Finds the landmarks of the most prominent face, each image by itself."""
+    """Finds the landmarks of the most prominent face, each image by itself.
+
+    Attributes:
+        landmark_set: the set that it gives.
+    """
+
+    landmark_set: LandmarkSet
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
         """Landmarks of an image (h, w, 3), float32, linear RGB."""
@@ -46,48 +63,103 @@ class LandmarkTrack:
 
     Attributes:
         frames: (F,) int frame numbers.
-        points_px: (F, 66, 2); NaN where a frame is not valid.
-        confidence: (F, 66) in [0, 1].
+        points_px: (F, N, 2); NaN where a frame is not valid.
+        confidence: (F, N) in [0, 1].
         valid: (F,) bool.
+        landmark_set: what the N points are.
+        depth_px: (F, N) away from the camera, NaN where not valid; None where the detector has none.
     """
 
     frames: np.ndarray
     points_px: np.ndarray
     confidence: np.ndarray
     valid: np.ndarray
+    landmark_set: LandmarkSet = IBUG66
+    depth_px: np.ndarray | None = None
 
     @classmethod
     def of(cls, frames: Sequence[int], found: Sequence[Landmarks]) -> LandmarkTrack:
-        """One entry a frame."""
+        """One entry a frame, all of one set."""
+        depth = None
+        if any(entry.depth_px is not None for entry in found):
+            unknown = np.full(len(found[0].points_px), np.nan)
+            depth = np.stack([unknown if e.depth_px is None else e.depth_px for e in found])
         return cls(
             np.asarray(frames, dtype=np.int64),
             np.stack([entry.points_px for entry in found]),
             np.stack([entry.confidence for entry in found]),
             np.array([entry.found for entry in found], dtype=bool),
+            found[0].landmark_set if len(found) else IBUG66,
+            depth,
+        )
+
+    def as_ibug66(self) -> LandmarkTrack:
+        """The 66 points of `ibug66` alone."""
+        if self.landmark_set is IBUG66:
+            return self
+        ids = self.landmark_set.ibug66
+        return LandmarkTrack(
+            self.frames, self.points_px[:, ids], self.confidence[:, ids], self.valid
         )
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(
-            path,
-            frames=self.frames,
-            points_px=self.points_px,
-            confidence=self.confidence,
-            valid=self.valid,
-        )
+        more = {}
+        if self.landmark_set is not IBUG66:
+            more["landmark_set"] = np.array(self.landmark_set.name)
+        if self.depth_px is not None:
+            more["depth_px"] = self.depth_px.astype(np.float32)
+        write_arrays(path, **{name: getattr(self, name) for name in _ARRAYS}, **more)
 
     @classmethod
-    def load(cls, paths: str | Path | Sequence[str | Path]) -> LandmarkTrack:
-        """Read one file, or join several in order of frame."""
+    def load(
+        cls,
+        paths: str | Path | Sequence[str | Path],
+        landmark_set: LandmarkSet | None = IBUG66,
+    ) -> LandmarkTrack:
+        """Read one file, or join several in order of frame.
+
+        Args:
+            landmark_set: the set that is wanted; None: the one that the files have.
+
+        Raises:
+            InputError: a file cannot be read, or has not the points of the wanted set.
+        """
         paths = [paths] if isinstance(paths, str | Path) else list(paths)
-        parts = [_read_arrays(path) for path in paths]
-        joined = {
-            key: np.concatenate([part[key] for part in parts])
-            for key in ("frames", "points_px", "confidence", "valid")
-        }
-        order = np.argsort(joined["frames"], kind="stable")
-        return cls(**{key: value[order] for key, value in joined.items()})
+        parts = [_read_track(path) for path in paths]
+        wanted = landmark_set or parts[0].landmark_set
+        parts = [_of_set(part, wanted, path) for part, path in zip(parts, paths, strict=True)]
+        order = np.argsort(np.concatenate([part.frames for part in parts]), kind="stable")
+        joined = {n: np.concatenate([getattr(p, n) for p in parts])[order] for n in _ARRAYS}
+        depth = [part.depth_px for part in parts]
+        known = all(values is not None for values in depth)
+        return cls(
+            **joined,
+            landmark_set=parts[0].landmark_set,
+            depth_px=np.concatenate(depth)[order] if known else None,
+        )
 
 
-def _read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    return read_arrays(path, "landmark file", ("frames", "points_px", "confidence", "valid"))
+def _of_set(track: LandmarkTrack, wanted: LandmarkSet, path: str | Path) -> LandmarkTrack:
+    if track.landmark_set is wanted:
+        return track
+    if wanted is IBUG66:
+        return track.as_ibug66()
+    raise InputError(
+        f"landmarks of the set {track.landmark_set.name}",
+        f"those of the set {wanted.name}, as elsewhere in this take or subject",
+        "Remove the folder of landmarks of the subject's takes and run again.",
+        path=path,
+    )
+
+
+_ARRAYS = ("frames", "points_px", "confidence", "valid")
+
+
+def _read_track(path: str | Path) -> LandmarkTrack:
+    arrays = read_arrays(path, "landmark file")
+    if not arrays.keys() >= set(_ARRAYS):
+        read_arrays(path, "landmark file", _ARRAYS)  # says what is missing
+    name = str(arrays.get("landmark_set", IBUG66.name))
+    own = {key: arrays[key] for key in _ARRAYS}
+    return LandmarkTrack(**own, landmark_set=set_of(name), depth_px=arrays.get("depth_px"))

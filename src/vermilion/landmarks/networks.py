@@ -12,7 +12,7 @@ import numpy as np
 
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.network_input import SIZE, network_input
-from vermilion.landmarks.scheme import N_LANDMARKS
+from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.errors import InputError
 
 FACE_FILE = "mnv3_detection_opt.onnx"
@@ -40,6 +40,8 @@ class NetworkSettings:
 
 class NetworkDetector:
     """Detects face and landmarks in each image by itself, so that chunks do not matter."""
+
+    landmark_set = IBUG66
 
     def __init__(self, folder: str | Path, settings: NetworkSettings | None = None):
         self.settings = settings or NetworkSettings()
@@ -99,9 +101,9 @@ def decode_heat_maps(field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Args:
         field: (198, 28, 28): confidence, y offset, x offset of each point.
     """
-    maps = field.reshape(3, N_LANDMARKS, 28 * 28)
+    maps = field.reshape(3, IBUG66.n_points, 28 * 28)
     cell = maps[0].argmax(axis=1)
-    point = np.arange(N_LANDMARKS)
+    point = np.arange(IBUG66.n_points)
     confidence = maps[0][point, cell].astype(np.float64)
     y = 223.0 * ((cell // 28) / 27.0 + _logit(maps[1][point, cell]))
     x = 223.0 * ((cell % 28) / 27.0 + _logit(maps[2][point, cell]))

@@ -55,7 +55,7 @@ class ScanViews:
 
     def landmarks(self, camera: Camera, detector: LandmarkDetector) -> tuple[Landmarks, np.ndarray]:
         """What the detector finds in one view, and its points (66, 3) on the surface, NaN elsewhere."""
-        found = detector.detect(self.image(camera))
+        found = detector.detect(self.image(camera)).as_ibug66()
         if not found.found:
             return found, np.full((N_LANDMARKS, 3), np.nan)
         return found, self.on_surface(camera, found.points_px)

@@ -10,9 +10,11 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.tracking.identity.landmark_identity import IdentityFit, TakeSample
 from vermilion.tracking.landmark_fit.expression import HeadMotion
+from vermilion.tracking.places import LandmarkPlaces
 
 
 @dataclass(frozen=True)
@@ -22,11 +24,12 @@ class Identity:
     Attributes:
         identity: (I,) in standard deviations.
         neutral_mm: (V, 3) in the head frame.
-        landmark_offset_mm: (66, 3) in the head frame: where the detector sees the neutral's
+        landmark_offset_mm: (N, 3) in the head frame: where the detector sees the neutral's
             landmarks, less where the model has them.
         takes: (T,) str, all of the subject's takes that were used.
         focal_px: (T,) known or estimated.
         calibrated: (T,) bool, whether it was known.
+        places: where the N landmarks lie on the model; None: the 66 vertices that it names.
     """
 
     identity: np.ndarray
@@ -35,10 +38,22 @@ class Identity:
     takes: np.ndarray
     focal_px: np.ndarray
     calibrated: np.ndarray
+    places: LandmarkPlaces | None = None
+
+    @property
+    def landmark_set(self) -> LandmarkSet:
+        """The landmarks that the person was found in."""
+        return IBUG66 if self.places is None else self.places.landmark_set
 
     @classmethod
-    def of(cls, fit: IdentityFit, model: FaceModel, samples: Sequence[TakeSample]) -> Identity:
-        """Of a fit to the samples of some takes."""
+    def of(
+        cls,
+        fit: IdentityFit,
+        model: FaceModel,
+        samples: Sequence[TakeSample],
+        places: LandmarkPlaces | None = None,
+    ) -> Identity:
+        """Of a fit to the samples of some takes; `places` as for the fit."""
         return cls(
             identity=fit.identity,
             neutral_mm=model.neutral_of(fit.identity),
@@ -46,6 +61,7 @@ class Identity:
             takes=np.array([sample.name for sample in samples], dtype=str),
             focal_px=np.array([fit.focal_px[sample.name] for sample in samples]),
             calibrated=np.array([sample.calibrated for sample in samples]),
+            places=places,
         )
 
     def focal_of(self, take: str) -> float | None:
@@ -57,12 +73,18 @@ class Identity:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        _save(path, self)
+        arrays = {name: np.asarray(getattr(self, name)) for name in _names(Identity)}
+        places = {} if self.places is None else self.places.arrays()
+        write_arrays(path, **arrays, **{f"places/{key}": value for key, value in places.items()})
 
     @classmethod
     def load(cls, path: str | Path) -> Identity:
         """Read what `save` wrote."""
-        return cls(**_load(path, cls))
+        arrays = _load(path, cls)
+        everything = read_arrays(path, "Identity of the tracker")
+        start = "places/"
+        places = {k.removeprefix(start): v for k, v in everything.items() if k.startswith(start)}
+        return cls(**arrays, places=LandmarkPlaces.from_arrays(places) if places else None)
 
 
 @dataclass(frozen=True)
@@ -161,7 +183,9 @@ class TrackedTake:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        _save(path, self)
+        write_arrays(
+            path, **{name: np.asarray(getattr(self, name)) for name in _names(TrackedTake)}
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> TrackedTake:
@@ -169,12 +193,10 @@ class TrackedTake:
         return cls(**_load(path, cls))
 
 
-def _save(path: str | Path, record) -> None:
-    arrays = {item.name: np.asarray(getattr(record, item.name)) for item in fields(record)}
-    write_arrays(path, **arrays)
+def _names(kind: type) -> list[str]:
+    """The fields of a record that are arrays."""
+    return [item.name for item in fields(kind) if item.name != "places"]
 
 
 def _load(path: str | Path, kind: type) -> dict[str, np.ndarray]:
-    return read_arrays(
-        path, f"{kind.__name__} of the tracker", [item.name for item in fields(kind)]
-    )
+    return read_arrays(path, f"{kind.__name__} of the tracker", _names(kind))

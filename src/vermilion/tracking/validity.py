@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.storage.quality import QualityRow
 from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
@@ -18,9 +17,7 @@ def fits(
 
     Near: within `max_reprojection` inter-ocular distances, root mean square.
     """
-    corners = shape.neutral_mm[EYE_CORNERS]
-    interocular_mm = np.linalg.norm(corners[0] - corners[1])
-    interocular_px = focal_px * interocular_mm / motion.translation_mm[:, 2]
+    interocular_px = focal_px * shape.interocular_mm / motion.translation_mm[:, 2]
     with np.errstate(invalid="ignore"):
         return motion.reprojection_px <= max_reprojection * interocular_px
 

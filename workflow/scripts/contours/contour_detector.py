@@ -5,6 +5,7 @@ import numpy as np
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.labelled_frames import offset_rows, read_labelled
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.contours.training import TrainingSettings, train_detector
@@ -36,15 +37,15 @@ class TrackedRings:
         return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
 
 
-def from_track(cfg, camera, source, track, rings):
-    """The detector that a take's own images and track tell; None where no frame serves."""
+def from_track(cfg, camera, source, track, rings, inner_reach):
+    """The detector that a take's own images and the rings tell; None where no frame serves."""
     options = cfg.track
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector(
         cfg.interocular_size_px,
         cfg.margin,
         cfg.ridge_width,
-        options.inner_reach,
+        inner_reach,
         cfg.edge_weight,
         cfg.stiffness,
         options.frame_reach,
@@ -65,7 +66,8 @@ def main(snakemake) -> None:
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     place, camera = {"subject": subject, "take": take}, snakemake.params.camera
     source = open_frames(snakemake.params.source, **place)
-    track = LandmarkTrack.load(snakemake.input.landmarks)
+    found = LandmarkTrack.load(snakemake.input.landmarks, None)
+    track, dense = found.as_ibug66(), dense_lips(found)
     labelled, rows, by_track = [], [], None
     if cfg.kind in ("auto", "boosted"):
         labelled, rows = read_labelled(
@@ -77,8 +79,9 @@ def main(snakemake) -> None:
             **place,
         )
     if cfg.kind in ("auto", "track"):
-        rings = TrackedRings(snakemake.input, track)
-        by_track = from_track(cfg, camera, source, track, rings)
+        rings = LandmarkRings(found) if dense else TrackedRings(snakemake.input, track)
+        reach = cfg.lips_reach if dense else cfg.track.inner_reach
+        by_track = from_track(cfg, camera, source, track, rings, reach)
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)
     if labelled:
@@ -88,7 +91,7 @@ def main(snakemake) -> None:
             cfg.interocular_size_px,
             cfg.margin,
             cfg.ridge_width,
-            cfg.ridge_reach,
+            cfg.lips_reach if dense else cfg.ridge_reach,
             cfg.edge_weight,
             cfg.stiffness,
         )

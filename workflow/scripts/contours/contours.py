@@ -3,6 +3,7 @@
 from vermilion.config.contours import ContourMapsConfig
 from vermilion.contours.detector_file import load_detector
 from vermilion.contours.labels import label_paths, read_label
+from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.maps import evenly, frame_maps, maps_overlay, sheet, write_maps
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
@@ -22,17 +23,22 @@ def main(snakemake) -> None:
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     source = open_frames(snakemake.params.source, subject, take)
     detector = load_detector(snakemake.input.detector)
-    track = LandmarkTrack.load(snakemake.input.landmarks)
+    found = LandmarkTrack.load(snakemake.input.landmarks, None)
+    track = found.as_ibug66()
     labels = label_paths(snakemake.params.capture, snakemake.params.camera)
-    coarse = lips = camera = None
-    if detector.from_track:
+    frames, lips_px = track.frames.tolist(), {}
+    if dense_lips(found):
+        rings = LandmarkRings(found)
+        lips_px = {frame: rings(frame) for frame in frames}
+    elif detector.from_track:
         coarse = read_sequence(snakemake.input.coarse[0])
         lips = TrackedLips.of(FaceModel.load(snakemake.input.tracker))
         camera = TrackedTake.load(snakemake.input.fit).camera
-    shown = evenly(track.frames.tolist(), cfg.overlay_frames)
+        lips_px = {f: lips.rings_px(coarse[row], camera) for row, f in enumerate(frames)}
+    shown = evenly(frames, cfg.overlay_frames)
     rows, images = [], []
     with atomic_folder(snakemake.output.maps) as folder:
-        for index, frame in enumerate(progress(track.frames.tolist(), "contour maps")):
+        for index, frame in enumerate(progress(frames, "contour maps")):
             points = track.points_px[index]
             maps, image, row = frame_maps(
                 source,
@@ -42,7 +48,7 @@ def main(snakemake) -> None:
                 bool(track.valid[index]),
                 detector,
                 cfg.least_peak,
-                lips.rings_px(coarse[index], camera) if lips else None,
+                lips_px.get(frame),
             )
             rows.append(row)
             if maps is None:

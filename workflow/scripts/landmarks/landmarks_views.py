@@ -33,7 +33,7 @@ def main(snakemake):
             continue
         path = Path(snakemake.params.csv.format(camera=camera))
         if detector is not None:
-            found[camera] = detector.detect(image)
+            found[camera] = detector.detect(image).as_ibug66()
         elif path.is_file():
             settings = {k: v for k, v in cfg["landmarks.csv"].items() if k != "path"}
             found[camera] = read_landmark_csv(path, **settings).at(frame)

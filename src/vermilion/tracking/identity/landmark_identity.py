@@ -27,6 +27,7 @@ from vermilion.tracking.landmark_fit.observation import (
 )
 from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
 from vermilion.tracking.landmark_fit.start import first_guess
+from vermilion.tracking.places import LandmarkPlaces
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class IdentityFit:
 
     Attributes:
         identity: (I,) in standard deviations.
-        landmark_offset_mm: (66, 3) in the head frame: where the detector sees the landmarks of
+        landmark_offset_mm: (N, 3) in the head frame: where the detector sees the landmarks of
             the neutral, less where the model has them.
         focal_px: take -> focal length, of every take.
         reprojection_px: root mean square over all frames.
@@ -87,17 +88,27 @@ class IdentityFit:
 
 
 def fit_identity(
-    model: FaceModel, samples: list[TakeSample], settings: IdentitySettings | None = None
+    model: FaceModel,
+    samples: list[TakeSample],
+    settings: IdentitySettings | None = None,
+    places: LandmarkPlaces | None = None,
 ) -> IdentityFit:
-    """Fit one person. Raises InputError where no sampled frame has landmarks."""
-    problem = IdentityProblem(model, samples, settings or IdentitySettings())
+    """Fit one person.
+
+    Args:
+        places: of the samples' landmarks on the model; None: the 66 vertices that it names.
+
+    Raises:
+        InputError: no sampled frame has landmarks.
+    """
+    problem = IdentityProblem(model, samples, settings or IdentitySettings(), places)
     return problem.result(*problem.solve())
 
 
 class IdentityProblem:
-    """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (198), log focal (takes)."""
+    """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (3 N), log focal (takes)."""
 
-    def __init__(self, model, samples, settings):
+    def __init__(self, model, samples, settings, places=None):
         keep = [np.flatnonzero(sample.seen.valid) for sample in samples]
         counts = [len(k) for k in keep]
         if sum(counts) == 0:
@@ -107,8 +118,10 @@ class IdentityProblem:
                 "Look at the landmark overlays; check the detector's settings.",
             )
         self.samples, self.settings = samples, settings
-        self.shape = LandmarkShape.of(model)
-        self.identities = without_size(landmark_identities(model), self.shape.neutral_mm)
+        self.shape = LandmarkShape.of(model, places=places)
+        self.landmark_set = self.shape.landmark_set
+        self.n_offset = 3 * self.landmark_set.n_points
+        self.identities = without_size(landmark_identities(model, places), self.shape.neutral_mm)
         self.n_identity, self.n_weights = len(self.identities), self.shape.n_expressions
         parts = [sample.seen[k] for sample, k in zip(samples, keep, strict=True)]
         self.image = np.concatenate([part.image for part in parts])
@@ -120,21 +133,25 @@ class IdentityProblem:
         self.frame_prior = np.zeros((self.n_frames, N_POSE + self.n_weights))
         self.frame_prior[:, N_POSE:] = sigma[:, None] ** -2.0
         self.guess = np.log([sample.focal_px for sample in samples])
-        corners = self.shape.neutral_mm[[36, 45]]
-        interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
         # A known focal length is one whose prior is so tight that it cannot move.
         loose = np.array([not sample.calibrated for sample in samples])
         self.shared_prior = np.concatenate(
             [
                 np.ones(self.n_identity),
-                np.repeat((settings.bias.per_landmark() * interocular_mm) ** -2.0, 3),
+                np.repeat(self._bias_mm() ** -2.0, 3),
                 np.where(loose, settings.focal_sigma**-2.0, 1e12),
             ]
         )
-        self.sigma_mm = settings.fit.noise.per_landmark() * interocular_mm
+        self.sigma_mm = self.shape.sigma_mm(settings.fit.noise)
+
+    def _bias_mm(self) -> np.ndarray:
+        """Deviations (N,) of the landmarks' offsets."""
+        bias = self.settings.bias.per_landmark(self.landmark_set)
+        return bias * self.shape.interocular_mm
 
     def first_guess(self):
-        seen = Observations(self.image, self.trust, np.ones(self.n_frames, dtype=bool))
+        valid = np.ones(self.n_frames, dtype=bool)
+        seen = Observations(self.image, self.trust, valid, self.landmark_set)
         rotation, translation, weights = first_guess(
             self.shape,
             seen,
@@ -145,21 +162,26 @@ class IdentityProblem:
         vectors, self.reference = log_about_mean(rotation)
         self.sigma_px = self.sigma_mm * (np.exp(self.guess)[self.take] / translation[:, 2])[:, None]
         frames = np.concatenate([vectors, translation, weights], axis=1)
-        shared = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
+        shared = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
         return frames, shared
 
     def _neutral(self, shared: np.ndarray) -> np.ndarray:
-        offset = shared[self.n_identity : self.n_identity + 198].reshape(66, 3)
+        offset = self._offset(shared)
         person = np.tensordot(shared[: self.n_identity], self.identities, axes=1)
         return self.shape.neutral_mm + person + offset
 
+    def _offset(self, shared: np.ndarray) -> np.ndarray:
+        """(N, 3) mm."""
+        return shared[self.n_identity : self.n_identity + self.n_offset].reshape(-1, 3)
+
     def focal(self, shared: np.ndarray) -> np.ndarray:
         """(F, 1) pixels."""
-        return np.exp(shared[self.n_identity + 198 :])[self.take][:, None]
+        return np.exp(shared[self.n_identity + self.n_offset :])[self.take][:, None]
 
     def _residual(self, points: np.ndarray, focal: np.ndarray):
         image = project(points, focal)
-        white = whitening(image, self.sigma_px, self.trust, self.settings.fit.jaw_slide)
+        slide = self.settings.fit.jaw_slide
+        white = whitening(image, self.sigma_px, self.trust, slide, self.landmark_set.jaw)
         return image, white, (white @ (image - self.image)[..., None])[..., 0]
 
     def _camera_points(self, frames: np.ndarray, shared: np.ndarray) -> np.ndarray:
@@ -169,7 +191,7 @@ class IdentityProblem:
         return points + frames[:, None, 3:6]
 
     def _shared_from_prior(self, shared: np.ndarray) -> np.ndarray:
-        centre = np.concatenate([np.zeros(self.n_identity + 198), self.guess])
+        centre = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
         return shared - centre
 
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
@@ -183,7 +205,7 @@ class IdentityProblem:
         return float(total)
 
     def _linearised(self, frames: np.ndarray, shared: np.ndarray):
-        """Weighted residuals (F, 132) and Jacobians by frame unknowns and by shared ones."""
+        """Weighted residuals (F, 2 N) and Jacobians by frame unknowns and by shared ones."""
         shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
         turned, by_rotation = pose_jacobian(
             frames[:, :3], self.reference, shape.points(frames[:, N_POSE:])
@@ -199,16 +221,16 @@ class IdentityProblem:
         by_weight = np.einsum("fnij,knj->fnik", by_head, self.shape.expressions_mm)
         by_frame = np.concatenate([by_point @ by_rotation, by_point, by_weight], axis=-1)
         n = self.n_identity
-        by_shared = np.zeros((self.n_frames, 66, 2, len(shared)))
+        by_shared = np.zeros((self.n_frames, self.landmark_set.n_points, 2, len(shared)))
         by_shared[..., :n] = np.einsum("fnij,knj->fnik", by_head, self.identities)
-        landmark = np.arange(66)
+        landmark = np.arange(self.landmark_set.n_points)
         for axis in range(3):
             by_shared[:, landmark, :, n + 3 * landmark + axis] = np.moveaxis(
                 by_head[..., axis], 0, 1
             )
-        column = n + 198 + self.take
+        column = n + self.n_offset + self.take
         by_shared[np.arange(self.n_frames), :, :, column] = (white @ image[..., None])[..., 0]
-        size = (self.n_frames, 132)
+        size = (self.n_frames, 2 * self.landmark_set.n_points)
         return residual.reshape(size), by_frame.reshape(*size, -1), by_shared.reshape(*size, -1)
 
     def normal_equations(self, frames: np.ndarray, shared: np.ndarray) -> NormalEquations:
@@ -250,14 +272,14 @@ class IdentityProblem:
 
     def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
         image = project(self._camera_points(frames, shared), self.focal(shared))
-        squared = ((image - self.image) ** 2).sum(axis=-1)[:, 17:]
-        focal = np.exp(shared[self.n_identity + 198 :])
+        squared = ((image - self.image) ** 2).sum(axis=-1)[:, self.landmark_set.compared]
+        focal = np.exp(shared[self.n_identity + self.n_offset :])
         known = [
             s.focal_px if s.calibrated else f for s, f in zip(self.samples, focal, strict=True)
         ]
         return IdentityFit(
             identity=shared[: self.n_identity].copy(),
-            landmark_offset_mm=shared[self.n_identity : self.n_identity + 198].reshape(66, 3),
+            landmark_offset_mm=self._offset(shared),
             focal_px={s.name: float(f) for s, f in zip(self.samples, known, strict=True)},
             reprojection_px=float(np.sqrt(squared.mean())),
         )

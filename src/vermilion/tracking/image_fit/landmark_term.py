@@ -25,7 +25,7 @@ class LandmarkTerm:
         shape: the person's landmarks.
         seen: one frame.
         focal_px: of the camera.
-        sigma_px: (66,) deviations.
+        sigma_px: (N,) deviations.
         settings: of the landmark fit.
     """
 
@@ -45,9 +45,7 @@ class LandmarkTerm:
         settings: FitSettings,
     ) -> LandmarkTerm:
         """With deviations that are a share of the inter-ocular distance at `depth_mm`."""
-        corners = shape.neutral_mm[[36, 45]]
-        interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
-        sigma = settings.noise.per_landmark() * interocular_mm * focal_px / depth_mm
+        sigma = shape.sigma_mm(settings.noise) * focal_px / depth_mm
         return cls(shape, seen, focal_px, sigma[None], settings)
 
     def cost(self, x: np.ndarray, reference: np.ndarray) -> float:

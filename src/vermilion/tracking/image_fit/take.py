@@ -15,7 +15,6 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import log_about_mean, rotation_matrix
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.landmarks.scheme import JAW
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
 from vermilion.tracking.image_fit.frame_fit import FrameProblem, View, visible_trust
@@ -118,7 +117,7 @@ class TakeStart:
         shape = self.landmark_shape()
         points = shape.points(x[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
         squared = ((project(points, focal_px(self.camera)) - self.seen.image) ** 2).sum(axis=-1)
-        error = np.sqrt(squared[:, len(JAW) :].mean(axis=1))
+        error = np.sqrt(squared[:, self.seen.landmark_set.compared].mean(axis=1))
         return replace(
             fit,
             weights=x[:, N_POSE:],
@@ -130,7 +129,10 @@ class TakeStart:
     def landmark_shape(self) -> LandmarkShape:
         """The person's landmarks."""
         return LandmarkShape.of(
-            self.model, self.identity.identity, self.identity.landmark_offset_mm
+            self.model,
+            self.identity.identity,
+            self.identity.landmark_offset_mm,
+            self.identity.places,
         )
 
     def view(

@@ -127,9 +127,7 @@ class _TakeProblem:
             )
         self.shape, self.seen, self.focal, self.settings = shape, seen, focal_px, settings
         self.n_frames, self.n_weights = len(seen.image), shape.n_expressions
-        corners = shape.neutral_mm[[36, 45]]
-        self.interocular_mm = float(np.linalg.norm(corners[0] - corners[1]))
-        self.sigma_mm = settings.noise.per_landmark() * self.interocular_mm
+        self.sigma_mm = shape.sigma_mm(settings.noise)
         self.prior = np.zeros(N_POSE + self.n_weights)
         self.prior[N_POSE:] = settings.weight_sigma**-2.0
         self.lower = np.concatenate([np.full(N_POSE, -np.inf), np.zeros(self.n_weights)])
@@ -199,7 +197,7 @@ class _TakeProblem:
 
     def motion(self, x: np.ndarray) -> HeadMotion:
         image = project(self._camera_points(x), self.focal)
-        squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, 17:]
+        squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, self.seen.landmark_set.compared]
         reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
         rotation = exp_about_mean(x[:, :3], self.reference)
         return HeadMotion(rotation, x[:, 3:6].copy(), x[:, N_POSE:].copy(), reprojection)
@@ -212,7 +210,7 @@ def landmark_cost(
     sigma_px: np.ndarray,
     settings: FitSettings,
 ) -> float:
-    """Landmark term of the energy, the model's landmarks being at (F, 66, 3) in the camera frame."""
+    """Landmark term of the energy, the model's landmarks being at (F, N, 3) in the camera frame."""
     _, residual = _whitened(points_mm, seen, focal_px, sigma_px, settings)
     return float(robust_cost(residual, settings.noise.robust_sigmas).sum())
 
@@ -229,7 +227,7 @@ def landmark_equations(
     """Gauss-Newton matrices (F, P, P) and gradients (F, P) of the landmark term.
 
     Args:
-        sigma_px: (F, 66).
+        sigma_px: (F, N).
         reference: (3, 3), which the rotation vectors turn.
         x: (F, P = 6 + K) rotation vector, translation, weights.
     """
@@ -254,7 +252,8 @@ def _whitened(
     sigma_px: np.ndarray,
     settings: FitSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whitening matrices (F, 66, 2, 2) and whitened residuals (F, 66, 2)."""
+    """Whitening matrices (F, N, 2, 2) and whitened residuals (F, N, 2)."""
     image = project(points_mm, focal_px)
-    white = whitening(image, sigma_px, seen.trust, settings.jaw_slide)
+    jaw = seen.landmark_set.jaw
+    white = whitening(image, sigma_px, seen.trust, settings.jaw_slide, jaw)
     return white, (white @ (image - seen.image)[..., None])[..., 0]

@@ -9,7 +9,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.landmarks.scheme import BROWS, EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, NOSE
+from vermilion.landmarks.sets import IBUG66, LandmarkSet
 
 
 @dataclass(frozen=True)
@@ -26,18 +26,10 @@ class LandmarkNoise:
     mouth: float = 0.015
     robust_sigmas: float = 3.0
 
-    def per_landmark(self) -> np.ndarray:
-        """(66,)."""
-        sigma = np.empty(N_LANDMARKS)
-        for ids, value in (
-            (JAW, self.jaw),
-            (BROWS, self.brows),
-            (NOSE, self.nose),
-            (np.concatenate([EYE_LEFT, EYE_RIGHT]), self.eyes),
-            (MOUTH, self.mouth),
-        ):
-            sigma[ids] = value
-        return sigma
+    def per_landmark(self, landmark_set: LandmarkSet = IBUG66) -> np.ndarray:
+        """(N,) of the points of a set."""
+        kinds = {name: getattr(self, name) for name in ("jaw", "brows", "nose", "eyes", "mouth")}
+        return landmark_set.per_point(kinds)
 
 
 @dataclass(frozen=True)
@@ -45,14 +37,16 @@ class Observations:
     """Landmarks of frames relative to the principal point of an ideal pinhole camera.
 
     Attributes:
-        image: (F, 66, 2) pixels from the principal point (zero where not valid).
-        trust: (F, 66) in [0, 1]; zero where not valid.
+        image: (F, N, 2) pixels from the principal point (zero where not valid).
+        trust: (F, N) in [0, 1]; zero where not valid.
         valid: (F,) bool.
+        landmark_set: what the N points are.
     """
 
     image: np.ndarray
     trust: np.ndarray
     valid: np.ndarray
+    landmark_set: LandmarkSet = IBUG66
 
     @classmethod
     def of(cls, track: LandmarkTrack, camera: Camera) -> Observations:
@@ -63,10 +57,13 @@ class Observations:
         local = directions @ camera.rotation.T
         image = focal_px(camera) * local[..., :2] / local[..., 2:3]
         trust = np.clip(track.confidence, 0.0, 1.0) * valid[:, None]
-        return cls(np.where(valid[:, None, None], image, 0.0), trust, valid)
+        image = np.where(valid[:, None, None], image, 0.0)
+        return cls(image, trust, valid, track.landmark_set)
 
     def __getitem__(self, frames: np.ndarray) -> Observations:
-        return Observations(self.image[frames], self.trust[frames], self.valid[frames])
+        return replace(
+            self, image=self.image[frames], trust=self.trust[frames], valid=self.valid[frames]
+        )
 
 
 def focal_px(camera: Camera) -> float:
@@ -101,27 +98,32 @@ def projection_jacobian(points_mm: np.ndarray, focal: float | np.ndarray) -> np.
 
 
 def whitening(
-    points_px: np.ndarray, sigma_px: np.ndarray, trust: np.ndarray, jaw_slide: float
+    points_px: np.ndarray,
+    sigma_px: np.ndarray,
+    trust: np.ndarray,
+    jaw_slide: float,
+    jaw_ids: np.ndarray = IBUG66.jaw,
 ) -> np.ndarray:
-    """Matrices (F, 66, 2, 2) that turn residuals into deviations.
+    """Matrices (F, N, 2, 2) that turn residuals into deviations.
 
     Landmarks of the jaw slide along its line: only the part of the residual across it counts, the
     part along it by `jaw_slide` (0 to 1).
 
     Args:
-        points_px: (F, 66, 2) projected model landmarks.
-        sigma_px: (F, 66) deviations.
-        trust: (F, 66).
+        points_px: (F, N, 2) projected model landmarks.
+        sigma_px: (F, N) deviations.
+        trust: (F, N).
+        jaw_ids: landmarks of the jaw's line, in its order.
     """
     scale = np.sqrt(trust) / sigma_px
     result = scale[..., None, None] * np.eye(2)
-    jaw = points_px[:, JAW]
+    jaw = points_px[:, jaw_ids]
     tangent = np.empty_like(jaw)
     tangent[:, 1:-1] = jaw[:, 2:] - jaw[:, :-2]
     tangent[:, 0], tangent[:, -1] = jaw[:, 1] - jaw[:, 0], jaw[:, -1] - jaw[:, -2]
     tangent /= np.maximum(np.linalg.norm(tangent, axis=-1, keepdims=True), 1e-9)
     along = tangent[..., :, None] * tangent[..., None, :]
-    result[:, JAW] = scale[:, JAW, None, None] * (np.eye(2) - (1 - jaw_slide) * along)
+    result[:, jaw_ids] = scale[:, jaw_ids, None, None] * (np.eye(2) - (1 - jaw_slide) * along)
     return result
 
 
@@ -144,10 +146,10 @@ def pose_jacobian(
 
 
 def robust_weights(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy weights (F, 66) of whitened residuals (F, 66, 2)."""
+    """Cauchy weights (F, N) of whitened residuals (F, N, 2)."""
     return 1.0 / (1.0 + (deviations**2).sum(axis=-1) / limit**2)
 
 
 def robust_cost(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy cost (F, 66) of whitened residuals, whose weights `robust_weights` are."""
+    """Cauchy cost (F, N) of whitened residuals, whose weights `robust_weights` are."""
     return 0.5 * limit**2 * np.log1p((deviations**2).sum(axis=-1) / limit**2)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.faces.model import FaceModel
+from vermilion.landmarks.sets import IBUG66, LandmarkSet
+from vermilion.tracking.landmark_fit.observation import LandmarkNoise
+from vermilion.tracking.places import LandmarkPlaces
 
 
 @dataclass(frozen=True)
@@ -14,12 +17,16 @@ class LandmarkShape:
     """A person's landmarks as neutral + expressions, linear, in the head frame.
 
     Attributes:
-        neutral_mm: (66, 3).
-        expressions_mm: (K, 66, 3).
+        neutral_mm: (N, 3).
+        expressions_mm: (K, N, 3).
+        landmark_set: what the N landmarks are.
+        known: (N,) bool, landmarks that the model has a place for; None: all.
     """
 
     neutral_mm: np.ndarray
     expressions_mm: np.ndarray
+    landmark_set: LandmarkSet = IBUG66
+    known: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -27,32 +34,59 @@ class LandmarkShape:
         model: FaceModel,
         identity: np.ndarray | None = None,
         offset_mm: np.ndarray | None = None,
+        places: LandmarkPlaces | None = None,
     ) -> LandmarkShape:
-        """Landmarks of a person; `offset_mm` (66, 3) as `Identity.landmark_offset_mm`."""
-        neutral = landmark_neutral(model)
+        """Landmarks of a person.
+
+        Args:
+            offset_mm: (N, 3) as `Identity.landmark_offset_mm`.
+            places: of the landmarks on the model; None: the 66 vertices that it names.
+        """
+        neutral = landmark_neutral(model, places)
         if identity is not None and len(identity):
-            neutral = neutral + np.tensordot(identity, landmark_identities(model), axes=1)
+            neutral = neutral + np.tensordot(identity, landmark_identities(model, places), axes=1)
         if offset_mm is not None:
             neutral = neutral + offset_mm
-        return cls(neutral, model.expressions_mm[:, model.landmarks].astype(np.float64))
+        expressions = _at_landmarks(model.expressions_mm, model, places)
+        if places is None:
+            return cls(neutral, expressions)
+        return cls(neutral, expressions, places.landmark_set, places.known)
 
     @property
     def n_expressions(self) -> int:
         return len(self.expressions_mm)
 
+    @property
+    def interocular_mm(self) -> float:
+        """Distance of the outer eye corners."""
+        corners = self.neutral_mm[self.landmark_set.eye_corners]
+        return float(np.linalg.norm(corners[0] - corners[1]))
+
+    def sigma_mm(self, noise: LandmarkNoise) -> np.ndarray:
+        """Deviations (N,) of the landmarks at the head; infinite where the model has no place."""
+        sigma = noise.per_landmark(self.landmark_set) * self.interocular_mm
+        return sigma if self.known is None else np.where(self.known, sigma, np.inf)
+
     def points(self, weights: np.ndarray) -> np.ndarray:
-        """Landmarks (..., 66, 3) of weights (..., K)."""
+        """Landmarks (..., N, 3) of weights (..., K)."""
         return self.neutral_mm + np.tensordot(weights, self.expressions_mm, axes=(-1, 0))
 
 
-def landmark_neutral(model: FaceModel) -> np.ndarray:
-    """(66, 3) landmarks of the mean face."""
-    return model.neutral_mm[model.landmarks].astype(np.float64)
+def landmark_neutral(model: FaceModel, places: LandmarkPlaces | None = None) -> np.ndarray:
+    """(N, 3) landmarks of the mean face."""
+    return _at_landmarks(model.neutral_mm, model, places)
 
 
-def landmark_identities(model: FaceModel) -> np.ndarray:
-    """(I, 66, 3) displacements at one standard deviation."""
-    return model.identities_mm[:, model.landmarks].astype(np.float64)
+def landmark_identities(model: FaceModel, places: LandmarkPlaces | None = None) -> np.ndarray:
+    """(I, N, 3) displacements at one standard deviation."""
+    return _at_landmarks(model.identities_mm, model, places)
+
+
+def _at_landmarks(field: np.ndarray, model: FaceModel, places: LandmarkPlaces | None) -> np.ndarray:
+    """A field (..., V, 3) at the landmarks, (..., N, 3) float64."""
+    if places is None:
+        return field[..., model.landmarks, :].astype(np.float64)
+    return places.of(field)
 
 
 def without_size(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:

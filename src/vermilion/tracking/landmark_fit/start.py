@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.landmarks.scheme import JAW
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.observation import Observations
 from vermilion.tracking.landmark_fit.pose import scaled_orthographic_pose
@@ -24,7 +23,7 @@ def first_guess(
     Args:
         shape: the person's landmarks.
         seen: F frames, all valid.
-        sigma: (66,) deviations of the landmarks in millimetres at the head.
+        sigma: (N,) deviations of the landmarks in millimetres at the head.
         focal: (F,) pixels.
         weight_sigma: deviation of the blend weights about zero.
 
@@ -33,7 +32,7 @@ def first_guess(
     """
     n_frames, n_weights = len(seen.image), shape.n_expressions
     trust = seen.trust / sigma**2
-    trust[:, JAW] = 0.0  # a silhouette: no fixed points
+    trust[:, seen.landmark_set.jaw] = 0.0  # a silhouette: no fixed points
     weights = np.zeros((n_frames, n_weights))
     none = np.zeros((0, n_weights))
     for _ in range(rounds):

@@ -1,0 +1,184 @@
+"""mediapipe's attention mesh: 478 landmarks, run in an environment of its own.
+
+mediapipe 0.10.21 (Apache-2.0) is the last version whose wheel contains its networks, and it needs an older
+numpy than Vermilion's. So `mediapipe_runner.py` runs as one process beside, in the environment that
+`tools/setup_landmarks.sh` makes, and is handed images one by one.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+
+from vermilion.imaging.images import linear_to_srgb
+from vermilion.landmarks import mediapipe_runner
+from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.sets import MEDIAPIPE478, LandmarkSet
+from vermilion.storage.errors import InputError
+
+#: Faces that are looked for beside the one that counts.
+MAX_FACES = 4
+_STEPS = 65535
+_DISPLAY = np.rint(linear_to_srgb(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class MeshFace:
+    """One face in an image.
+
+    Attributes:
+        points_px: (478, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
+        depth_px: (478,) away from the camera, in the same unit, from an origin near the head's middle.
+        presence: probability that there is a face, [0, 1].
+    """
+
+    points_px: np.ndarray
+    depth_px: np.ndarray
+    presence: float
+
+
+class MediapipeDetector:
+    """Landmarks of each image by itself, so that chunks do not matter.
+
+    A face is found with its mirror image, and the two answers are averaged: what the network has learnt
+    of one side only goes, and so does a part of its noise.
+    """
+
+    landmark_set: LandmarkSet = MEDIAPIPE478
+
+    def __init__(self, environment: str | Path):
+        """`environment`: folder of the virtual environment. Raises InputError where it is absent."""
+        self._python = environment_python(environment)
+        self._process: subprocess.Popen | None = None
+        self._messages = None
+
+    def detect(self, linear_rgb: np.ndarray) -> Landmarks:
+        """Landmarks of the largest face in an image (h, w, 3), float32, linear RGB."""
+        faces = self.faces(linear_rgb)
+        if not faces:
+            return Landmarks.none(self.landmark_set)
+        face = faces[0]
+        confidence = np.full(len(face.points_px), face.presence)
+        return Landmarks(face.points_px, confidence, True, self.landmark_set, face.depth_px)
+
+    def faces(self, linear_rgb: np.ndarray, max_faces: int = MAX_FACES) -> list[MeshFace]:
+        """All faces in an image (h, w, 3), float32, linear RGB, the largest first.
+
+        Raises:
+            InputError: the process of the network ended.
+        """
+        pixels = _display(np.ascontiguousarray(linear_rgb, dtype=np.float32), _DISPLAY)
+        height, width = pixels.shape[:2]
+        if self._process is None:
+            self._start()
+        try:
+            self._process.stdin.write(struct.pack("<3I", height, width, max_faces))
+            self._process.stdin.write(memoryview(pixels).cast("B"))
+            self._process.stdin.flush()
+        except OSError as error:
+            raise self._ended() from error
+        count = struct.unpack("<I", self._read(4))[0]
+        return [self._face() for _ in range(count)]
+
+    def close(self) -> None:
+        """End the process; the next image would start it again."""
+        if self._process is not None:
+            self._process.stdin.close()
+            self._process.wait()
+            self._process.stdout.close()
+            self._messages.close()
+            self._process = None
+
+    def __enter__(self) -> MediapipeDetector:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def _start(self) -> None:
+        environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+        environment |= {
+            "OMP_NUM_THREADS": "1",
+            "GLOG_minloglevel": "2",
+            "TF_CPP_MIN_LOG_LEVEL": "2",
+        }
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
+        # Isolated: neither this package's folder nor its packages may be imported over there.
+        self._process = subprocess.Popen(
+            [str(self._python), "-I", mediapipe_runner.__file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._messages,
+            env=environment,
+        )
+        if self._read(len(mediapipe_runner.MAGIC)) != mediapipe_runner.MAGIC:
+            raise self._ended()
+
+    def _face(self) -> MeshFace:
+        n_points = self.landmark_set.n_points
+        values = np.frombuffer(self._read(4 * (1 + 2 * n_points * 3)), "<f4").astype(np.float64)
+        points, mirrored = values[1:].reshape(2, n_points, 3)
+        mean = 0.5 * (points + mirrored[self.landmark_set.mirror])
+        return MeshFace(mean[:, :2], mean[:, 2], float(np.clip(values[0], 0.0, 1.0)))
+
+    def _read(self, count: int) -> bytes:
+        data = self._process.stdout.read(count)
+        if len(data) < count:
+            raise self._ended()
+        return data
+
+    def _ended(self) -> InputError:
+        status = self._process.wait()
+        self._messages.seek(0)
+        lines = self._messages.read().decode(errors="replace").strip().splitlines()
+        self._process, said = None, lines[-1] if lines else "nothing"
+        return InputError(
+            f"that the process of the landmark network ended with status {status} and said: {said}",
+            "answers until the last image",
+            "Make its environment anew with tools/setup_landmarks.sh, or set landmarks.detector to "
+            "another kind.",
+        )
+
+
+def environment_python(environment: str | Path) -> Path:
+    """The interpreter of the network's environment.
+
+    Raises:
+        InputError: there is none; the message says why where the set-up left a reason.
+    """
+    folder = Path(environment)
+    python = folder / "bin" / "python"
+    if python.is_file():
+        return python
+    reason = Path(f"{folder}.unavailable")
+    found = "no environment of the landmark network"
+    if reason.is_file():
+        found += f" ({reason.read_text().strip()})"
+    raise InputError(
+        found,
+        "a virtual environment with mediapipe 0.10.21",
+        f"Run 'tools/setup_landmarks.sh {folder}' (Python 3.9 to 3.12), or set landmarks.detector to "
+        "another kind.",
+        path=folder,
+    )
+
+
+@numba.njit(cache=True)
+def _display(linear, table):
+    """Linear RGB (h, w, 3) float32 as sRGB uint8; values beyond [0, 1] are cut off."""
+    result = np.empty(linear.shape, dtype=np.uint8)
+    for y in range(linear.shape[0]):
+        for x in range(linear.shape[1]):
+            for c in range(3):
+                value = linear[y, x, c]
+                value = value if value > 0 else np.float32(0)  # NaN gives zero
+                value = value if value < 1 else np.float32(1)
+                result[y, x, c] = table[np.int32(value * np.float32(_STEPS) + np.float32(0.5))]
+    return result

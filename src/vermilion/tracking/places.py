@@ -1,0 +1,227 @@
+"""Where the landmarks of a set lie on a face model: faces and barycentric coordinates.
+
+The places of `ibug66` are vertices that every face model names. Those of another set are found once a
+model: the detector looks at the model's bare neutral, its shape is warped so that the points it shares with
+`ibug66` fall on that set's vertices, and the others go to the closest point of the surface. Points of
+the lips' rings lie on the model's own lip contours, each at its share of the way along them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+from vermilion.faces.contours import contour_halves
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.surface_points import SurfacePoints
+from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
+from vermilion.scan.views import ScanViews, camera_towards
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
+
+_HIDDEN = ("mouth_inner", "teeth", "eyes")  # regions that no landmark lies on
+
+
+@dataclass(frozen=True)
+class LandmarkPlaces:
+    """The landmarks of a set on the topology of a face model.
+
+    Attributes:
+        landmark_set: the set, of N points.
+        points: (N,) places; unbound for points that the model has no surface for (irises).
+        triangles: (T, 3) of the face model.
+    """
+
+    landmark_set: LandmarkSet
+    points: SurfacePoints
+    triangles: np.ndarray
+
+    @property
+    def known(self) -> np.ndarray:
+        """(N,) bool: points that have a place."""
+        return self.points.bound
+
+    def of(self, field: np.ndarray) -> np.ndarray:
+        """Values (..., N, d) float64 of a field (..., V, d) on the model's vertices; zero where unknown."""
+        return np.where(self.known[:, None], self.points.sample(field, self.triangles), 0.0)
+
+    @classmethod
+    def of_ibug66(cls, model: FaceModel) -> LandmarkPlaces:
+        """The vertices that the model names."""
+        return cls(
+            IBUG66, SurfacePoints.at_vertices(model.landmarks, model.triangles), model.triangles
+        )
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """As arrays, from which `from_arrays` makes the same."""
+        return {
+            "landmark_set": np.array(self.landmark_set.name),
+            "triangle": self.points.triangle,
+            "barycentric": self.points.barycentric,
+            "triangles": self.triangles.astype(np.int32),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> LandmarkPlaces:
+        """Of what `arrays` gave."""
+        points = SurfacePoints(arrays["triangle"], arrays["barycentric"])
+        return cls(set_of(str(arrays["landmark_set"])), points, arrays["triangles"])
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        write_arrays(path, **self.arrays())
+
+    @classmethod
+    def load(cls, path: str | Path) -> LandmarkPlaces:
+        """Read what `save` wrote. Raises InputError on a damaged file."""
+        names = ("landmark_set", "triangle", "barycentric", "triangles")
+        return cls.from_arrays(read_arrays(path, "file of landmark places", names))
+
+
+class ShapeDetector(Protocol):
+    """Finds points with their depth, as `landmarks.mediapipe` does."""
+
+    landmark_set: LandmarkSet
+
+    def detect(self, linear_rgb: np.ndarray):
+        """`Landmarks` with `depth_px`."""
+
+
+def detected_shape(model: FaceModel, detector: ShapeDetector) -> np.ndarray:
+    """What a detector sees of the model's bare neutral from the front: (N, 3), any scale and origin.
+
+    Axes as the head frame's: x to the subject's left, y up, z out of the face.
+
+    Raises:
+        InputError: no face found.
+    """
+    middle = model.neutral_mm[model.landmarks].mean(axis=0)
+    camera = camera_towards(
+        middle, 260.0, np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 640
+    )
+    image = ScanViews(Mesh(model.neutral_mm, model.triangles)).image(camera)
+    found = detector.detect(image.astype(np.float32))
+    if not found.found or found.depth_px is None:
+        raise InputError(
+            f"no face in an image of the face model '{model.name}'",
+            "one that the landmark detector knows",
+            "Set landmarks.detector to another kind.",
+        )
+    return np.column_stack([found.points_px * [1.0, -1.0], -found.depth_px])
+
+
+def register_places(
+    model: FaceModel, landmark_set: LandmarkSet, shape: np.ndarray
+) -> tuple[LandmarkPlaces, np.ndarray]:
+    """Places of a set on a face model, by the set's shape.
+
+    Args:
+        shape: (N, 3) points of a face at rest; scale and origin do not matter, axes as the head frame's.
+
+    Returns:
+        the places, and how far each point was moved onto the surface, (N,) mm; NaN where unknown.
+    """
+    ids, wanted = landmark_set.ibug66, model.neutral_mm[model.landmarks]
+    placed = similarity_alignment(shape[ids], wanted).apply(shape)
+    lips = _lip_places(model, landmark_set, placed)
+    at_lips = lips.sample(model.neutral_mm, model.triangles)
+    target = np.full_like(placed, np.nan)
+    target[ids] = wanted
+    target[lips.bound] = at_lips[lips.bound]
+    anchors = np.isfinite(target).all(axis=1)
+    # Linear in the distance: the smoothest warp of space (biharmonic) that hits the anchors.
+    warp = RBFInterpolator(placed[anchors], (target - placed)[anchors], kernel="linear", degree=1)
+    warped = placed + warp(placed)
+    found, distance = _closest_skin(model, warped)
+    named = SurfacePoints.at_vertices(model.landmarks, model.triangles)
+    for points, source, rows in ((lips, lips.bound, lips.bound), (named, slice(None), ids)):
+        found.triangle[rows] = points.triangle[source]
+        found.barycentric[rows] = points.barycentric[source]
+        distance[rows] = 0.0
+    if "irises" in landmark_set.groups:
+        irises = landmark_set.groups["irises"]
+        found.triangle[irises], distance[irises] = -1, np.nan
+    return LandmarkPlaces(landmark_set, found, model.triangles), distance
+
+
+def _closest_skin(model: FaceModel, points: np.ndarray) -> tuple[SurfacePoints, np.ndarray]:
+    """Closest points of the model's skin to points (N, 3) mm, and the distances (N,)."""
+    hidden = np.any([model.regions[name] for name in _HIDDEN], axis=0)
+    skin = np.flatnonzero(~hidden[model.triangles].any(axis=1))
+    found = Surface(model.neutral_mm, model.triangles[skin]).closest(points)
+    return SurfacePoints(skin[found.triangle], found.barycentric), found.distance_mm
+
+
+def _lip_places(model: FaceModel, landmark_set: LandmarkSet, shape: np.ndarray) -> SurfacePoints:
+    """Places of the points of the outer and the inner ring, on the model's contours; others unbound."""
+    n_points = landmark_set.n_points
+    found = SurfacePoints(np.full(n_points, -1, dtype=np.int32), np.zeros((n_points, 3)))
+    right, left = landmark_set.outer_corners
+    for name, loop in (("inner", model.inner_contour), ("outer", model.outer_contour)):
+        upper, lower = contour_halves(model.neutral_mm, model.landmarks, loop)
+        for lip, path in (("upper", upper), ("lower", lower[::-1])):
+            line = landmark_set.lip_line(lip, name)
+            if right not in line:  # the model's contours share their corners, the set's do not
+                line = np.concatenate([[right], line, [left]])
+            points = _along(model, path, _shares(model, landmark_set, shape, line, path))
+            found.triangle[line], found.barycentric[line] = points.triangle, points.barycentric
+    return found
+
+
+def _shares(
+    model: FaceModel,
+    landmark_set: LandmarkSet,
+    shape: np.ndarray,
+    line: np.ndarray,
+    path: np.ndarray,
+) -> np.ndarray:
+    """How far along a path of vertices the points `line` lie, (n,) mm from the right corner.
+
+    Points that are of `ibug66` lie where the model's landmarks do; between these the shape tells.
+    """
+    along = _lengths(shape[line])
+    vertex_of = dict(zip(landmark_set.ibug66.tolist(), model.landmarks.tolist(), strict=True))
+    known = [row for row, point in enumerate(line.tolist()) if point in vertex_of]
+    ends = model.neutral_mm[[vertex_of[int(line[row])] for row in known]]
+    points = model.neutral_mm[path]
+    nearest = np.linalg.norm(points[None] - ends[:, None], axis=2).argmin(axis=1)
+    return np.interp(along, along[known], _lengths(points)[nearest])
+
+
+def _lengths(points: np.ndarray) -> np.ndarray:
+    """Length of a polyline (n, 3) up to each of its points, (n,)."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _along(model: FaceModel, path: np.ndarray, along_mm: np.ndarray) -> SurfacePoints:
+    """Places at lengths (n,) mm along a path of vertices."""
+    lengths = _lengths(model.neutral_mm[path])
+    edge = np.clip(np.searchsorted(lengths, along_mm, side="right") - 1, 0, len(path) - 2)
+    start, end = path[edge], path[edge + 1]
+    fraction = np.clip((along_mm - lengths[edge]) / (lengths[edge + 1] - lengths[edge]), 0.0, 1.0)
+    triangle = _triangles_of(np.stack([start, end], axis=1), model.triangles)
+    corner = model.triangles[triangle]
+    weights = (corner == start[:, None]) * (1 - fraction[:, None])
+    weights = weights + (corner == end[:, None]) * fraction[:, None]
+    return SurfacePoints(triangle, weights)
+
+
+def _triangles_of(edges: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """A triangle that has each of the edges (n, 2), (n,) int32."""
+    n_vertices = int(triangles.max()) + 1
+
+    def keys(pairs):
+        pairs = np.sort(pairs.astype(np.int64), axis=1)
+        return pairs[:, 0] * n_vertices + pairs[:, 1]
+
+    there = keys(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    order = np.argsort(there, kind="stable")
+    return (order[np.searchsorted(there, keys(edges), sorter=order)] // 3).astype(np.int32)
