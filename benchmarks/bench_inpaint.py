@@ -12,12 +12,13 @@ import cv2
 import numpy as np
 
 from tests import lip_patch
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
-from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
+from vermilion.inpaint.shading import ShadingSettings
+from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 
 POSES = {"rest": (0.0, 0.0), "open": (7.0, 0.1), "pucker": (1.0, 1.0)}
 
@@ -47,10 +48,10 @@ def main() -> None:
                 (rig[n], lip_patch.render(model, model.neutral_mm, rig[n], tattoo)) for n in names
             ]
             mesh = wrong_by(model.neutral_mm, error_mm, seed)
-            return bake(domain, mesh, model.triangles, views)
+            return bake(domain, RayCaster(mesh, model.triangles), mesh, views)
 
         plain, tattooed, reference = baked(0, rig, 1), baked(1, rig, 2), baked(1, ["front"], 2)
-        opacity = feathered(domain, tattoo_mask(domain, tattooed, plain, 4.0, 6.0), 0.6, 1.0)
+        opacity = feather_mask(domain, tattoo_mask(domain, tattooed, plain, 4.0, 6.0), 0.6, 1.0)
         for pose, values in POSES.items():
             truth_mm, camera = lip_patch.vertices_at(*values), rig["front"]
             inked = lip_patch.render(model, truth_mm, camera, True)
@@ -61,11 +62,11 @@ def main() -> None:
                 cv2.inpaint(to_display(inked), where, 4, cv2.INPAINT_TELEA), truth, where > 0
             )
             for mode in ("ratio", "difference", "none"):
-                paint = Paint(
-                    domain, plain, reference, opacity, Shading(mode), 0.8, 0.0, grain=False
+                paint = InpaintInputs(
+                    domain, plain, reference, opacity, ShadingSettings(mode), 0.8, 0.0, grain=False
                 )
                 mesh, start = wrong_by(truth_mm, error_mm, 2), time.perf_counter()
-                ours = paint_frame(paint, inked, camera, mesh, model.triangles, (0,))
+                ours = inpaint_frame(paint, inked, camera, mesh, model.triangles, (0,))
                 seconds = time.perf_counter() - start
                 value = psnr_db(to_display(ours.linear), truth, where > 0)
                 print(f"{error_mm}\t{pose}\t{mode}\t{value:.1f}\t{telea:.1f}\t{seconds:.2f}")

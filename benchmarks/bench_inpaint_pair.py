@@ -46,10 +46,10 @@ from vermilion.imaging.draw import label, to_display
 from vermilion.imaging.images import read_image
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
 from vermilion.inpaint.grain import seed_of
-from vermilion.inpaint.opening import Evidence
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
+from vermilion.inpaint.opening import OpeningSettings
+from vermilion.inpaint.shading import ShadingSettings
 from vermilion.storage.sequences import read_sequence
 from vermilion.studio.capture_writer import image_path, write_images
 from vermilion.studio.take import StudioTakePlan, plan_of
@@ -164,7 +164,7 @@ class Scene:
         self.red = regions["vermilion_upper"] | regions["vermilion_lower"]
         self.plain = read_image(image_path(self.results / "captures/p1/plain", FRONTAL, 0))
 
-    def _paint(self, take: Path) -> Paint:
+    def _paint(self, take: Path) -> InpaintInputs:
         config = InpaintConfig()
         cfg, how = config.domain, config.composite
         domain = lip_domain(self.template, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
@@ -172,10 +172,10 @@ class Scene:
         reference, more = read_texture(take / "inpaint/reference.exr", domain)
         light = config.shading.model_dump()
         gap_mm = light.pop("gap_mm")
-        return Paint(
-            domain, plain, reference, more["opacity"], Shading(**light), cfg.edge_mm,
+        return InpaintInputs(
+            domain, plain, reference, more["opacity"], ShadingSettings(**light), cfg.edge_mm,
             how.lens_px, how.rim_px, how.samples, how.grain, gap_mm,
-            Evidence(**config.opening.model_dump()),
+            OpeningSettings(**config.opening.model_dump()),
         )  # fmt: skip
 
     def vermilion(self, frame: int) -> np.ndarray:
@@ -192,7 +192,7 @@ class Scene:
         mesh = np.asarray(self.meshes[frame], dtype=np.float64)
         seed = seed_of(0, "p1", "rom", frame)
         return to_display(
-            paint_frame(paint, inked, self.camera, mesh, self.template.triangles, seed).linear
+            inpaint_frame(paint, inked, self.camera, mesh, self.template.triangles, seed).linear
         )
 
     def lips_px(self, frame: int) -> np.ndarray:

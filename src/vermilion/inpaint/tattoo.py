@@ -43,7 +43,7 @@ def tattoo_mask(
     return _closed(domain, mask, closing_mm)
 
 
-def feathered(
+def feather_mask(
     domain: LipDomain, mask: np.ndarray, border_mm: float, feather_mm: float
 ) -> np.ndarray:
     """Opacity (h, w) float32: 1 up to `border_mm` outside the mask, then smoothly to 0."""
