@@ -52,7 +52,8 @@ from vermilion.inpaint.opening import OpeningSettings
 from vermilion.inpaint.shading import ShadingSettings
 from vermilion.storage.sequences import read_sequence
 from vermilion.studio.capture_writer import image_path, write_images
-from vermilion.studio.take import StudioTakePlan, plan_of
+from vermilion.studio.take import StudioTakePlan, plan_take
+from vermilion.studio.take_settings import take_settings
 
 ROOT = Path(__file__).resolve().parents[1]
 N_FRAMES, FPS, CSV_STEP = 30, 10, 3
@@ -118,16 +119,16 @@ def bare_plan(model: FaceModel, take: StudioTake) -> StudioTakePlan:
         "identity_spread", "seed", "slight_open", "ease_in_frames", "intensity",
         "head_turn_deg", "head_shift_mm",
     )  # fmt: skip
-    return plan_of(
-        model,
-        role="plain",
-        first=0,
-        last=N_FRAMES - 1,
-        fps=FPS,
-        actor={"seed": SUBJECT_SEED, "identity": None},
-        performance=take.model_dump(mode="json"),
+    values = {
+        "role": "plain",
+        "first": 0,
+        "last": N_FRAMES - 1,
+        "fps": FPS,
+        "actor": {"seed": SUBJECT_SEED, "identity": None},
+        "performance": take.model_dump(mode="json"),
         **{key: getattr(studio, key) for key in keys},
-    )
+    }
+    return plan_take(model, take_settings(values))
 
 
 def render_bare(
@@ -156,7 +157,7 @@ class Scene:
         take = self.results / "takes/p1/rom"
         self.chunk = f"000000-{N_FRAMES - 1:06d}"
         self.camera = read_cameras(take / "cameras")[FRONTAL]
-        self.template = FaceModel.load(self.results / "face/template.npz")
+        self.template = FaceModel.load(self.results / "face_model/template.npz")
         self.meshes = read_sequence(take / f"multiview/H/{self.chunk}.npy")
         self.inpainted = take / "inpaint" / self.chunk
         self.paint = self._paint(take)

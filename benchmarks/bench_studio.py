@@ -20,7 +20,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.raycast import RayCaster
 from vermilion.studio.lighting import LIGHTINGS
 from vermilion.studio.look import look_of
-from vermilion.studio.render import Stage, render
+from vermilion.studio.render import Scene, render
 from vermilion.studio.rig import lips16_rig
 from vermilion.studio.surface import surface_of
 
@@ -45,16 +45,16 @@ def main() -> None:
 
         model = studio_model()
     vertices = model.neutral_mm
-    stage = Stage(model.triangles, surface_of(model), look_of(1, True), LIGHTINGS["rig"])
+    scene = Scene(model.triangles, surface_of(model), look_of(1, True), LIGHTINGS["rig"])
     cameras = lips16_rig(model, vertices, 735.0, (512, 512), (512, 512), 245.0, 105.0)
-    render(stage, vertices, cameras)  # compiles
+    render(scene, vertices, cameras)  # compiles
 
     def ours():
-        render(stage, vertices, cameras)
+        render(scene, vertices, cameras)
 
     def apart():
         for name, camera in cameras.items():
-            render(stage, vertices, {name: camera})
+            render(scene, vertices, {name: camera})
 
     def our_rays():
         caster = RayCaster(vertices, model.triangles)

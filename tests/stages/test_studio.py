@@ -22,7 +22,8 @@ from vermilion.studio.capture_writer import (
 from vermilion.studio.labels import contours, label_frames, view_mouth
 from vermilion.studio.render import render
 from vermilion.studio.surface import surface_of
-from vermilion.studio.take import cameras_of, plan_of
+from vermilion.studio.take import cameras_of, plan_take
+from vermilion.studio.take_settings import take_settings
 
 SIZES = {
     "camera_distance_mm": 735.0,
@@ -47,14 +48,13 @@ def surface(model):
 
 
 def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights="rig"):
-    return plan_of(
-        model,
-        role=role,
-        first=0,
-        last=last,
-        fps=30.0,
-        actor={"seed": 7, "identity": None},
-        performance={
+    values = {
+        "role": role,
+        "first": 0,
+        "last": last,
+        "fps": 30.0,
+        "actor": {"seed": 7, "identity": None},
+        "performance": {
             "performance": performance,
             "seed": seed,
             "poses": 0,
@@ -64,14 +64,15 @@ def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights=
             "csv_fps": 30.0,
             "lights": lights,
         },
-        identity_spread=0.7,
-        seed=0,
-        slight_open=0.08,
-        ease_in_frames=6,
-        intensity=1.0,
-        head_turn_deg=2.5,
-        head_shift_mm=2.0,
-    )
+        "identity_spread": 0.7,
+        "seed": 0,
+        "slight_open": 0.08,
+        "ease_in_frames": 6,
+        "intensity": 1.0,
+        "head_turn_deg": 2.5,
+        "head_shift_mm": 2.0,
+    }
+    return plan_take(model, take_settings(values))
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +86,7 @@ def cameras(rom):
 
 
 def images(take, surface, cameras, index=0):
-    return render(take.stage(index, surface, **RAYS), take.vertices_mm(index), cameras)
+    return render(take.scene(index, surface, **RAYS), take.vertices_mm(index), cameras)
 
 
 def open_mouth(model, weight):

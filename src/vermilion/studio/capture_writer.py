@@ -49,7 +49,7 @@ def write_images(
     surface = surface_of(plan.model)
     for frame in progress(list(frames), f"{name}: frames"):
         index = frame - first
-        images = render(plan.stage(index, surface, **rays), plan.vertices_mm(index), cameras)
+        images = render(plan.scene(index, surface, **rays), plan.vertices_mm(index), cameras)
         for camera, image in images.items():
             place = f"{name}/{camera}"
             noisy = sensor_noise(image, noise_read, noise_shot, seed, place, frame)

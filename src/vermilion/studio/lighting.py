@@ -8,7 +8,7 @@ import numpy as np
 
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
-from vermilion.studio import kernels
+from vermilion.studio import light_kernels
 
 #: Rays start this far off the surface (mm), so that a vertex does not shade itself.
 OFFSET_MM = 0.12
@@ -114,11 +114,11 @@ def bake(
         part = needed[start : start + 8192]
         origins, rays, owner = _buffers(len(part) * n_directions)
         args = (vertices_mm, normals, part)
-        count = kernels.sky_rays(*args, directions, OFFSET_MM, origins, rays, owner)
+        count = light_kernels.sky_rays(*args, directions, OFFSET_MM, origins, rays, owner)
         blocked = caster.occluded(origins[:count], rays[:count])
-        kernels.gather_sky(owner[:count], blocked, normals, directions, colours, sky)
+        light_kernels.gather_sky(owner[:count], blocked, normals, directions, colours, sky)
         origins, rays, owner = _buffers(len(part) * targets.shape[0] * n_points)
-        count = kernels.light_rays(*args, targets, OFFSET_MM, origins, rays, owner)
+        count = light_kernels.light_rays(*args, targets, OFFSET_MM, origins, rays, owner)
         free = ~caster.occluded(origins[:count], rays[:count])
         np.add.at(visible, (owner[:count][free, 0], owner[:count][free, 1]), 1.0 / n_points)
     return BakedLight(sky, visible)
