@@ -106,7 +106,10 @@ def view_texels(
     views: Sequence[tuple[Camera, np.ndarray]],
     edge_mm: float,
 ) -> list[TexelView]:
-    """The texels of a domain as each camera sees them; arguments as for `bake`, `vertices_mm` (V, 3)."""
+    """The texels of a domain as each camera sees them; arguments as for `bake`.
+
+    `vertices_mm` (V, 3) in the world, `views` of (camera, linear RGB (h, w, 3)).
+    """
     points, normals = _surface_points(domain, vertices_mm, caster.triangles)
     seen = []
     for camera, linear in views:

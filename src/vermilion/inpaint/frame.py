@@ -25,7 +25,8 @@ from vermilion.inpaint.composite import (
 from vermilion.inpaint.domain import LipDomain
 from vermilion.inpaint.fields import fill_holes, luminance, weighted_blur
 from vermilion.inpaint.grain import add_grain, missing_grain
-from vermilion.inpaint.opening import MouthPlace, Opening, OpeningSettings, find_opening
+from vermilion.inpaint.opening import MouthPlace, Opening, OpeningSettings
+from vermilion.inpaint.opening_search import find_opening
 from vermilion.inpaint.seam import seam_gain
 from vermilion.inpaint.shading import (
     ShadingSettings,

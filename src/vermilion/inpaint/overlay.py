@@ -31,7 +31,7 @@ def sample_frames(frames: Sequence[int], count: int) -> list[int]:
 
 
 def contact_sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
-    """Tiles (h, w, 3) uint8 side by side in rows, (H, W, 3); a note where there are none."""
+    """`tiles` (h, w, 3) uint8 side by side in rows, (H, W, 3); a note where there are none."""
     if not tiles:
         return label(np.full((60, 480, 3), 40, dtype=np.uint8), "no frame could be painted")
     return tile(tiles, columns)

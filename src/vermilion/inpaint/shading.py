@@ -95,7 +95,10 @@ def equalise_shading(
 
 
 def bare_skin(domain: LipDomain, opacity: np.ndarray, gap_mm: float) -> np.ndarray:
-    """Texels of the outer face at least `gap_mm` away from what is painted, (h, w) bool."""
+    """Texels of the outer face at least `gap_mm` away from what is painted, (h, w) bool.
+
+    `opacity` (h, w) of what is painted.
+    """
     away = domain.distance_mm(opacity > 0, gap_mm + 1.0)
     return (away > gap_mm) & domain.valid & ~domain.inner
 
@@ -130,9 +133,10 @@ def skin_gain(
     bare: np.ndarray,
     settings: ShadingSettings,
 ) -> np.ndarray:
-    """Gain a channel, (h, w, 3), that brings `base` to the target's bare skin, continued inwards.
+    """Gain a channel, (h, w, 3), that brings a texture to the target's bare skin.
 
-    The light's colour and strength may differ between the two takes; both vary slowly.
+    It is continued inwards: the light's colour and strength may differ between the two takes, but
+    vary slowly over the skin. `base` (h, w, 3) linear, `bare` (h, w) bool.
     """
     weights = np.where(bare, target.weight, 0.0)
     if not weights.any():
@@ -149,7 +153,10 @@ def border_gain(
     bare: np.ndarray,
     settings: ShadingSettings,
 ) -> np.ndarray:
-    """Gain of luminance, (h, w), at the border of the painted region; 1 in the middle of the lips."""
+    """Gain of luminance (h, w) at the border of the painted region, 1 in the middle of the lips.
+
+    `base` (h, w, 3) linear, `bare` (h, w) bool.
+    """
     weights = np.where(bare, target.weight, 0.0)
     if not weights.any():
         return np.ones(domain.shape, dtype=np.float32)

@@ -46,7 +46,10 @@ def tattoo_mask(
 def feather_mask(
     domain: LipDomain, mask: np.ndarray, border_mm: float, feather_mm: float
 ) -> np.ndarray:
-    """Opacity (h, w) float32: 1 up to `border_mm` outside the mask, then smoothly to 0."""
+    """Opacity (h, w) float32: 1 up to `border_mm` outside a mask, then smoothly to 0.
+
+    `mask` (h, w) bool.
+    """
     outside = domain.distance_mm(mask, border_mm + feather_mm + 1.0)
     t = np.clip((outside - border_mm) / max(feather_mm, 1e-6), 0.0, 1.0)
     return np.where(domain.valid, 1.0 - t * t * (3.0 - 2.0 * t), 0.0).astype(np.float32)

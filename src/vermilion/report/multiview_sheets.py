@@ -193,10 +193,11 @@ def _points_over(
     at = row * camera.width_px + column
     count = np.bincount(at, minlength=size).reshape(camera.height_px, camera.width_px)
     total = np.bincount(at, mesh.heights_mm[seen], size).reshape(count.shape)
-    count, total = (cv2.blur(part.astype(float), (2, 2)) for part in (count, total))  # larger dots
-    height = total / np.maximum(count, 1e-9)
+    # Larger dots.
+    points, height = (cv2.blur(part.astype(float), (2, 2)) for part in (count, total))
+    height = height / np.maximum(points, 1e-9)
     colours = 255 * colour_map(height, -scale_mm, scale_mm, "coolwarm")
-    return np.where(count[..., None] > 1e-9, np.rint(colours), image).astype(np.uint8)
+    return np.where(points[..., None] > 1e-9, np.rint(colours), image).astype(np.uint8)
 
 
 def _residual(mesh: _Mesh, carried: Carried | None, settings: SheetSettings) -> np.ndarray:

@@ -68,9 +68,10 @@ class TakeSheets:
     def draw(
         self, number: int, why: str, mesh_mm: np.ndarray | None, seeing: np.ndarray | None
     ) -> Sheet:
-        """A frame's sheet from its mesh (V, 3) and the cameras that measured each vertex (V,).
+        """A frame's sheet from its mesh and from how many cameras measured each vertex.
 
-        The neutral needs neither. Raises InputError where the frame cannot be read.
+        `mesh_mm` (V, 3) and `seeing` (V,); the neutral needs neither. Raises InputError where the
+        frame cannot be read.
         """
         if number == self.neutral_frame:
             vertices, carried, frame = self.neutral_mm, self._across, self._neutral

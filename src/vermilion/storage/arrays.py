@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from vermilion.storage.errors import InputError, VermilionError
+from vermilion.storage.errors import InputError, PlacedError
 from vermilion.storage.files import atomic_path
 
 
@@ -22,7 +22,7 @@ def read_arrays(
     path: str | Path,
     what: str,
     names: Iterable[str] | None = None,
-    error: type[VermilionError] = InputError,
+    error: type[PlacedError] = InputError,
     **place,
 ) -> dict[str, np.ndarray]:
     """Read the arrays of a file: those named, or all.
@@ -49,10 +49,10 @@ def read_arrays(
 
 
 def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write `.npz` (no pickle), whole or not at all."""
+    """Write `arrays`, each (n, ...), as `.npz` (no pickle), whole or not at all."""
     write_arrays(path, compressed=True, **arrays)
 
 
 def load_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read `.npz`; raises InputError where it is damaged."""
+    """Read the arrays, each (n, ...), of an `.npz`; raises InputError where it is damaged."""
     return read_arrays(path, "file of the evaluation")

@@ -99,10 +99,19 @@ def bake(
     n_directions: int = 192,
     n_points: int = 12,
 ) -> BakedLight:
-    """Ambient occlusion and soft shadows of the vertices `needed` (ids); the others stay dark.
+    """Ambient occlusion and soft shadows of some vertices; the others stay dark.
 
-    The directions and light points are the same for all vertices, so that neighbours differ
-    smoothly; a vertex's light depends on no camera.
+    The directions and the light points are the same for all vertices, so that neighbours differ
+    smoothly. A vertex's light depends on no camera.
+
+    Args:
+        caster: of the mesh.
+        vertices_mm: (V, 3) world.
+        normals: (V, 3) unit.
+        needed: (n,) ids of the vertices.
+        lighting: lights and sky.
+        n_directions: of the sky.
+        n_points: on each light.
     """
     directions = sphere_points(n_directions)
     colours = _sky_colours(directions, lighting)
@@ -134,7 +143,7 @@ def sphere_points(count: int) -> np.ndarray:
 
 
 def smooth_normals(vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Vertex normals, (V, 3) float64."""
+    """Vertex normals (V, 3) float64 of `vertices_mm` (V, 3), `triangles` (T, 3)."""
     return vertex_normals(np.asarray(vertices_mm, dtype=np.float64), triangles)
 
 

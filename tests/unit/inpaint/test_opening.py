@@ -11,7 +11,8 @@ import pytest
 from tests import lip_patch
 from vermilion.geometry.raycast import RayCaster
 from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
-from vermilion.inpaint.opening import MouthPlace, OpeningSettings, find_opening
+from vermilion.inpaint.opening import MouthPlace, OpeningSettings
+from vermilion.inpaint.opening_search import find_opening
 from vermilion.inpaint.shading import ShadingSettings
 
 
