@@ -46,7 +46,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER, interocular_px
 from vermilion.storage.sequences import read_sequence
-from vermilion.studio.labels import contours
+from vermilion.studio.labels import lip_contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake
 
@@ -65,7 +65,7 @@ def true_contours(studio: FaceModel, truth_mm: np.ndarray, camera) -> list[dict[
         inside_mm=surface.inside_mm[:n],
         upper=surface.upper[:n],
     )
-    return [contours(model, surface, frame.astype(np.float64), camera) for frame in truth_mm]
+    return [lip_contours(model, surface, frame.astype(np.float64), camera) for frame in truth_mm]
 
 
 def kinds_of(loops: list[dict[str, np.ndarray]]) -> np.ndarray:

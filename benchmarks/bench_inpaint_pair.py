@@ -47,7 +47,7 @@ from vermilion.imaging.images import read_image
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
-from vermilion.inpaint.grain import seed_of
+from vermilion.inpaint.grain import noise_seed
 from vermilion.inpaint.opening import OpeningSettings
 from vermilion.inpaint.shading import ShadingSettings
 from vermilion.storage.sequences import read_sequence
@@ -132,7 +132,7 @@ def bare_plan(model: FaceModel, take: StudioTake) -> StudioTakePlan:
 
 
 def render_bare(
-    folder: Path, plan: StudioTakePlan, cameras: dict[str, Camera], take: str, noise_seed: int
+    folder: Path, plan: StudioTakePlan, cameras: dict[str, Camera], take: str, sensor_seed: int
 ) -> None:
     """The frontal camera's images without the tattoo, as a capture folder of one camera."""
     studio = StudioConfig()
@@ -141,7 +141,7 @@ def render_bare(
     missing = [f for f in range(N_FRAMES) if not image_path(folder / take, FRONTAL, f).exists()]
     if missing:
         write_images(
-            plan, frontal, folder / take, missing, 0, name="p1/rom", seed=noise_seed,
+            plan, frontal, folder / take, missing, 0, name="p1/rom", seed=sensor_seed,
             noise_read=studio.noise_read, noise_shot=studio.noise_shot,
             n_directions=studio.occlusion_directions, n_points=studio.light_samples,
             edge_samples=studio.edge_samples,
@@ -191,7 +191,7 @@ class Scene:
             return to_display(read_image(self.inpainted / f"{frame:06d}.png"))
         paint = replace(self.paint, shading=replace(self.paint.shading, mode=mode))
         mesh = np.asarray(self.meshes[frame], dtype=np.float64)
-        seed = seed_of(0, "p1", "rom", frame)
+        seed = noise_seed(0, "p1", "rom", frame)
         return to_display(
             inpaint_frame(paint, inked, self.camera, mesh, self.template.triangles, seed).linear
         )
@@ -314,10 +314,10 @@ def main() -> None:
     if not (folder / "bare2").is_dir():
         write_sheet(folder)
         run_workflow(folder, [f"results/takes/p1/rom/inpaint/{chunk}"])
-    plan = bare_plan(FaceModel.load(results / "face/studio.npz"), take)
+    plan = bare_plan(FaceModel.load(results / "face_model/studio.npz"), take)
     cameras = read_cameras(results / "captures/p1/rom/cameras")
-    for name, noise_seed in (("bare", 0), ("bare2", 1)):
-        render_bare(folder, plan, cameras, name, noise_seed)
+    for name, sensor_seed in (("bare", 0), ("bare2", 1)):
+        render_bare(folder, plan, cameras, name, sensor_seed)
     write_sheet(folder, ("bare", "bare2"))
     targets = [f"results/takes/p1/{t}/tracking/C/{chunk}.npy" for t in ("rom", "bare", "bare2")]
     run_workflow(folder, [*targets, "results/subjects/p1/correspondence.npz"])

@@ -19,7 +19,7 @@ from vermilion.studio.capture_writer import (
     write_labels,
     write_truth,
 )
-from vermilion.studio.labels import contours, label_frames, view_mouth
+from vermilion.studio.labels import label_frames, lip_contours, view_mouth
 from vermilion.studio.render import render
 from vermilion.studio.surface import surface_of
 from vermilion.studio.take import cameras_of, plan_take
@@ -134,7 +134,7 @@ def test_paint_ends_where_the_labelled_contour_runs(model, surface, rom, cameras
     changed = (np.abs(painted - skin).max(axis=2) > 0.02).astype(np.uint8)
     loops, _ = cv2.findContours(changed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     edge = np.concatenate([loop[:, 0] for loop in loops]) + 0.5
-    label = contours(model, surface, rom.vertices_mm(0), camera)["outer"]
+    label = lip_contours(model, surface, rom.vertices_mm(0), camera)["outer"]
     loop = label.astype(np.float32).reshape(-1, 1, 2)
     depth = np.array([cv2.pointPolygonTest(loop, tuple(map(float, p)), True) for p in edge])
     outline = np.abs(depth)[np.abs(depth) < 6]
@@ -164,7 +164,7 @@ def test_the_inner_label_has_the_height_of_the_opening(model, surface, cameras):
     middle = model.landmarks[[60, 64]]  # middle of the inner loop, upper and lower
     for weight in (0.3, 0.7):
         vertices = open_mouth(model, weight)
-        inner = contours(model, surface, vertices, camera)["inner"]
+        inner = lip_contours(model, surface, vertices, camera)["inner"]
         ends = camera.project(vertices[middle])
         near = np.abs(inner[:, 0] - ends[:, 0].mean()) < 2.0
         gap = np.ptp(inner[near, 1])
@@ -173,7 +173,7 @@ def test_the_inner_label_has_the_height_of_the_opening(model, surface, cameras):
 
 def test_the_inner_label_of_closed_lips_is_a_line(model, surface, cameras):
     vertices = open_mouth(model, 0.0)
-    inner = contours(model, surface, vertices, cameras["face2"])["inner"]
+    inner = lip_contours(model, surface, vertices, cameras["face2"])["inner"]
     area = cv2.contourArea(inner.astype(np.float32))
     assert area / np.ptp(inner[:, 0]) < 1.0  # px of mean height
 

@@ -17,7 +17,7 @@ from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.layers import correction_layers
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.geometry.head_frame import align_frames
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 _ROUNDS = 20
 
@@ -39,12 +39,13 @@ class LipShapes:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        save_arrays(path, {name: getattr(self, name) for name in self.__dataclass_fields__})
+        arrays = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        write_arrays(path, compressed=True, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> LipShapes:
         """Read what `save` wrote."""
-        arrays = load_arrays(path)
+        arrays = read_arrays(path, "file of lip shapes")
         return cls(**{name: arrays[name] for name in cls.__dataclass_fields__})
 
     def on(self, neutral_mm: np.ndarray, triangles: np.ndarray, seam_mm: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.evaluation.errors import ClipSums
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 
 def save_sums(path: str | Path, sums: dict[str, ClipSums], n_frames: int) -> None:
@@ -17,12 +17,12 @@ def save_sums(path: str | Path, sums: dict[str, ClipSums], n_frames: int) -> Non
         for regressor, of_regressor in sums.items()
         for name, values in of_regressor.sums.items()
     }
-    save_arrays(path, {"n_frames": np.array(n_frames), **arrays})
+    write_arrays(path, compressed=True, n_frames=np.array(n_frames), **arrays)
 
 
 def load_sums(path: str | Path) -> tuple[dict[str, ClipSums], int]:
     """Read what `save_sums` wrote: (regressor -> sums, frames)."""
-    arrays = load_arrays(path)
+    arrays = read_arrays(path, "file of the evaluation")
     n_frames = int(arrays.pop("n_frames"))
     sums: dict[str, dict[str, np.ndarray]] = {}
     for key, values in arrays.items():

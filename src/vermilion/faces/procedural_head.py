@@ -192,7 +192,7 @@ def skin_point(w: np.ndarray) -> np.ndarray:
     return point
 
 
-def locate(xy: np.ndarray, steps: int = 12) -> np.ndarray:
+def chart_at(xy: np.ndarray, steps: int = 12) -> np.ndarray:
     """Chart points whose skin lies at frontal positions `xy` (N, 2) mm; front of the face only.
 
     Newton's method with numerical derivatives on the featureless head, which shares x, and y but

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from vermilion.faces.procedural_anchors import snap
-from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_scale_mm, locate
+from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_at, chart_scale_mm
 from vermilion.faces.procedural_mouth import LIP_LOOP, border_chart
 
 
@@ -121,13 +121,13 @@ def eye_rings(layout: Layout) -> tuple[np.ndarray, list[np.ndarray]]:
     count = 2 * round(68.0 / spacing / 2)
     phase = np.arange(count) * (2 * np.pi / count)
     centre = EYE_CENTRE_MM[:2] + np.array([0.3, 0.6])
-    rings, distance = [locate(lid_margin_xy(phase))], 0.0
+    rings, distance = [chart_at(lid_margin_xy(phase))], 0.0
     while distance < 15.5:
         distance += 0.9 * spacing * (1.0 + 0.07 * distance)
         circle = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
         share = 1.0 - np.exp(-distance / 22.0)
         xy = lid_margin_xy(phase) * (1 - share) + centre * share + distance * circle
-        rings.append(locate(xy))
+        rings.append(chart_at(xy))
     return phase, rings
 
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from vermilion.faces.procedural_head import locate, skin_point, smoothstep
+from vermilion.faces.procedural_head import chart_at, skin_point, smoothstep
 
 HALF_WIDTH_MM = 26.0
 STOMION_Y_MM = -39.0
@@ -108,7 +108,7 @@ def border_xy(theta: np.ndarray) -> np.ndarray:
 
 def border_chart(theta: np.ndarray) -> np.ndarray:
     """Chart position (N,) complex of the vermilion border at loop parameters `theta` (N,)."""
-    return locate(border_xy(theta))
+    return chart_at(border_xy(theta))
 
 
 def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -123,8 +123,8 @@ def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     height = border_height(u, upper) + 2.5 * behind * (1 - middle)
     gap = 0.5 * REST_GAP_MM * middle * np.clip(s / 0.75, 0.0, 1.0) ** 2
     y = lip_line_y(u) + sign * (share * height + gap)
-    border_z = skin_point(locate(_border_xy(u, upper)))[:, 2]
-    upper_z = skin_point(locate(_border_xy(u, np.ones(len(u), dtype=bool))))[:, 2]
+    border_z = skin_point(chart_at(_border_xy(u, upper)))[:, 2]
+    upper_z = skin_point(chart_at(_border_xy(u, np.ones(len(u), dtype=bool))))[:, 2]
     meeting_z = upper_z + _CORNER_MEETING_MM * (1 - middle)
     leaving = smoothstep(0.0, 1.0, np.clip(s, 0.0, 1.0))
     corner = np.where(s > 1.0, _CORNER_FOLD(np.maximum(s, 1.0)), 0.0)

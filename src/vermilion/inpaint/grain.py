@@ -57,6 +57,6 @@ def add_grain(
     return np.where(opacity[..., None] > 0, srgb_to_linear(np.clip(display, 0, 1)), linear)
 
 
-def seed_of(seed: int, subject: str, take: str, frame: int) -> tuple[int, ...]:
+def noise_seed(seed: int, subject: str, take: str, frame: int) -> tuple[int, ...]:
     """Seed of one frame's noise; independent of chunks and order."""
     return seed, zlib.crc32(f"{subject}/{take}".encode()), frame

@@ -37,7 +37,7 @@ class Column:
     colours: np.ndarray
 
 
-def sheet(
+def render_sheet(
     columns: Sequence[Column],
     frames: Sequence[int],
     centres_mm: np.ndarray,
@@ -63,12 +63,12 @@ def sheet(
                 cells.append(images[index] if view == "front" else paper)
             for column in columns:
                 text = f"{column.name}, frame {frame}" if view == "front" else ""
-                cells.append(caption(render(column, index, camera), text))
+                cells.append(caption(render_mesh(column, index, camera), text))
             rows.append(np.hstack(cells))
     return np.vstack(rows)
 
 
-def render(column: Column, index: int, camera: Camera) -> np.ndarray:
+def render_mesh(column: Column, index: int, camera: Camera) -> np.ndarray:
     """One mesh on white paper, (h, w, 3) uint8."""
     paper = np.full((camera.height_px, camera.width_px, 3), 255, np.uint8)
     mesh = np.asarray(column.meshes_mm[index], dtype=float)

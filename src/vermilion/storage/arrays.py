@@ -46,13 +46,3 @@ def read_arrays(
             path=path,
             **place,
         ) from cause
-
-
-def save_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write `arrays`, each (n, ...), as `.npz` (no pickle), whole or not at all."""
-    write_arrays(path, compressed=True, **arrays)
-
-
-def load_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read the arrays, each (n, ...), of an `.npz`; raises InputError where it is damaged."""
-    return read_arrays(path, "file of the evaluation")

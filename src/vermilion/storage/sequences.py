@@ -52,7 +52,9 @@ def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
     return np.concatenate([np.arange(first, last + 1) for first, last in spans])
 
 
-def locate(paths: Sequence[str | Path], frames: Sequence[int]) -> dict[int, tuple[str | Path, int]]:
+def rows_of_frames(
+    paths: Sequence[str | Path], frames: Sequence[int]
+) -> dict[int, tuple[str | Path, int]]:
     """Frame number -> (chunk file `<first>-<last>.<suffix>`, its row there)."""
     wanted = {int(frame) for frame in frames}
     return {

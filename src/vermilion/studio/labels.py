@@ -64,7 +64,7 @@ def view_mouth(
     return MouthView(side.astype(np.uint8), outside & (lip > 0), low)
 
 
-def contours(
+def lip_contours(
     model: FaceModel, surface: Surface, vertices_mm: np.ndarray, camera: Camera
 ) -> dict[str, np.ndarray]:
     """The lip contours that a camera sees, as closed polylines in pixels.

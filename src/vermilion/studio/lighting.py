@@ -90,7 +90,7 @@ def light_directions(lighting: Lighting) -> np.ndarray:
     return centres / np.linalg.norm(centres, axis=1, keepdims=True)
 
 
-def bake(
+def bake_light(
     caster: RayCaster,
     vertices_mm: np.ndarray,
     normals: np.ndarray,

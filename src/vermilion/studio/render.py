@@ -10,7 +10,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.studio import kernels
-from vermilion.studio.lighting import Lighting, bake, light_directions, smooth_normals
+from vermilion.studio.lighting import Lighting, bake_light, light_directions, smooth_normals
 from vermilion.studio.look import Look, noise_volume
 from vermilion.studio.surface import Surface
 
@@ -61,7 +61,7 @@ def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
         for hits in (view.hits, view.edge_hits):
             seen = np.unique(hits.triangle)
             needed[scene.triangles[seen[seen >= 0]]] = True
-    light = bake(
+    light = bake_light(
         caster,
         vertices,
         normals,

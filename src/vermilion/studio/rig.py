@@ -62,7 +62,7 @@ def lips16_rig(
         (LIP_ANGLES_DEG, lips, lip_size_px, lip_view_mm),
     ):
         for name, (turn, height) in angles.items():
-            cameras[name] = aimed(name, target, turn, height, distance_mm, size, view)
+            cameras[name] = aimed_camera(name, target, turn, height, distance_mm, size, view)
     return cameras
 
 
@@ -77,11 +77,11 @@ def video_camera(
 ) -> dict[str, Camera]:
     """One camera in front of the face of a neutral `neutral_mm` (V, 3)."""
     target = face_centre(model, neutral_mm)
-    camera = aimed("cam", target, turn_deg, height_deg, distance_mm, size_px, view_mm)
+    camera = aimed_camera("cam", target, turn_deg, height_deg, distance_mm, size_px, view_mm)
     return {"cam": camera}
 
 
-def aimed(
+def aimed_camera(
     name: str,
     target_mm: np.ndarray,
     turn_deg: float,

@@ -26,7 +26,7 @@ from vermilion.config.evaluation import (
     ReferenceConfig,
 )
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity
 
@@ -77,11 +77,11 @@ def write_truth(folder, truth, triangles):
 
 def add_contours(path):
     """Contours that were not found: the scene has no images."""
-    arrays = load_arrays(path)
+    arrays = read_arrays(path, "file")
     nothing = np.full((len(arrays["frames"]), 8, 2), np.nan)
     found = np.zeros(nothing.shape[:2], dtype=bool)
     none = {"outer_px": nothing, "inner_px": nothing, "outer_found": found, "inner_found": found}
-    save_arrays(path, arrays | none)
+    write_arrays(path, compressed=True, **(arrays | none))
 
 
 def write_identity(root, subject):

@@ -13,7 +13,7 @@ from tests.stages.run_script import run_script
 from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import VideoReader
-from vermilion.storage.arrays import load_arrays, save_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 
@@ -65,12 +65,13 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
     assert flagged["frame"].tolist() == [BAD_FRAME]
 
     take, out = scene.root / f"takes/{SUBJECT}/rom", tmp_path / "out"
-    fit = load_arrays(take / "tracking/fit.npz")
+    fit = read_arrays(take / "tracking/fit.npz", "fit")
     per_frame = {
         "frames", "weights", "world_from_head_rotation", "world_from_head_translation_mm", "valid",
         "reprojection_px",
     }  # fmt: skip
-    save_arrays(out / "fit.npz", {k: v[:12] if k in per_frame else v for k, v in fit.items()})
+    cut = {k: v[:12] if k in per_frame else v for k, v in fit.items()}
+    write_arrays(out / "fit.npz", compressed=True, **cut)
     run_script(
         "apply/apply_export",
         wildcards={"subject": SUBJECT, "take": "rom"},

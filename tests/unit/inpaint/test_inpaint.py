@@ -15,7 +15,7 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.fields import fill_holes, sample, weighted_blur
 from vermilion.inpaint.files import read_texture, write_texture
 from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
-from vermilion.inpaint.grain import add_grain, fine_deviation, seed_of
+from vermilion.inpaint.grain import add_grain, fine_deviation, noise_seed
 from vermilion.inpaint.shading import ShadingSettings, bare_skin, change_ratio
 from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 from vermilion.storage.errors import InputError
@@ -189,9 +189,9 @@ def test_pixels_without_paint_keep_their_bits():
 def test_noise_has_the_deviation_asked_for_and_its_seed():
     grey = np.full((80, 80, 3), 0.3, np.float32)
     opacity = np.ones((80, 80), np.float32)
-    noisy = add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 3))
-    assert np.array_equal(noisy, add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 3)))
-    assert not np.array_equal(noisy, add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 4)))
+    noisy = add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 3))
+    assert np.array_equal(noisy, add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 3)))
+    assert not np.array_equal(noisy, add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 4)))
     assert fine_deviation(noisy, opacity > 0) == pytest.approx(0.02, rel=0.3)
 
 

@@ -27,7 +27,7 @@ from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_
 from vermilion.evaluation.truth import read_curves, read_truth
 from vermilion.faces.model import FaceModel
 from vermilion.regression.model import load_model
-from vermilion.storage.arrays import save_arrays
+from vermilion.storage.arrays import write_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -212,7 +212,7 @@ def main(snakemake):
         result, take, frames, count, against, correspondence.coarse_neutral_mm, mouth, tracker,
         fit.camera,
     )  # fmt: skip
-    save_arrays(out.maps, maps)
+    write_arrays(out.maps, compressed=True, **maps)
     reasons = ["" if ok else "not tracked, so not measured" for ok in tracked]
     rows = [QualityRow(int(f), not why, why) for f, why in zip(asked, reasons, strict=True)]
     write_quality(out.quality, *place.values(), "evaluation", rows)

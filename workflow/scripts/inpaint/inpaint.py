@@ -11,7 +11,7 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
-from vermilion.inpaint.grain import seed_of
+from vermilion.inpaint.grain import noise_seed
 from vermilion.inpaint.opening import OpeningSettings
 from vermilion.inpaint.overlay import before_after, contact_sheet, sample_frames
 from vermilion.inpaint.shading import ShadingSettings
@@ -61,7 +61,7 @@ def main(snakemake):
             vertices = np.asarray(meshes[index], dtype=np.float64)
             painted = None
             if np.isfinite(vertices).all():
-                noise = seed_of(seed, **place, frame=frame)
+                noise = noise_seed(seed, **place, frame=frame)
                 painted = inpaint_frame(inputs, linear, camera, vertices, model.triangles, noise)
             if painted is None:
                 rows.append(QualityRow(frame, False, "no mesh in the image"))
