@@ -189,7 +189,7 @@ def _distance_from(model: FaceModel, source: np.ndarray, limit_mm: float) -> np.
 
 
 def _charted(model: FaceModel, candidates: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
-    """Candidates whose chart is sane (no seam, not folded over) and hangs together with the lips."""
+    """Candidates (T,) whose chart has no seam or fold and is connected to the lips, (T,) bool."""
     uv = model.uv.astype(np.float64)
     a, b, c = (uv[model.triangles[:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]

@@ -36,7 +36,7 @@ def tattoo_mask(
     coloured = _opened(domain, _closed(domain, coloured, closing_mm), 0.4)
     vermilion = domain.valid & (domain.lip_distance_mm < 0.5 * domain.texel_mm)
     mask = _joined_to(coloured | vermilion, vermilion)
-    # Inside the mouth only what both neutrals show can be judged; the rest continues its border.
+    # Inside the mouth, texels that one of the neutrals does not show continue those beside them.
     hidden = domain.valid & ~known
     continued = fill_holes(mask.astype(np.float32), known | vermilion) > 0.5
     mask = np.where(hidden, continued, mask) & domain.valid
