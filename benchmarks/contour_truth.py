@@ -44,7 +44,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
-from vermilion.studio.labels import contours
+from vermilion.studio.labels import lip_contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake
 
@@ -111,7 +111,7 @@ def true_contours(
         inside_mm=surface.inside_mm[:n],
         upper=surface.upper[:n],
     )
-    return [contours(model, surface, frame.astype(np.float64), camera) for frame in truth_mm]
+    return [lip_contours(model, surface, frame.astype(np.float64), camera) for frame in truth_mm]
 
 
 def kinds_of(loops: list[dict[str, np.ndarray]]) -> np.ndarray:

@@ -16,12 +16,13 @@ import numpy as np
 from benchmarks.common import print_table, timed
 from tests import lip_patch
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
-from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.inpaint.frame import InpaintInputs
+from vermilion.inpaint.shading import ShadingSettings
+from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 
 VARIANTS = ("ratio", "difference", "none")
 
@@ -45,7 +46,7 @@ def wrong_by(vertices: np.ndarray, rms_mm: float, seed: int) -> np.ndarray:
     return vertices + waves * rms_mm / np.sqrt((waves**2).sum(axis=1).mean())
 
 
-def paints(model: FaceModel, rig: dict, error_mm: float) -> dict[str, Paint]:
+def paints(model: FaceModel, rig: dict, error_mm: float) -> dict[str, InpaintInputs]:
     """The inpainter of each shading, its textures baked on meshes that are wrong by `error_mm`."""
     domain = lip_domain(model, 9.0, 4.0, 0.3)
 
@@ -54,12 +55,15 @@ def paints(model: FaceModel, rig: dict, error_mm: float) -> dict[str, Paint]:
             (rig[name], lip_patch.render(model, model.neutral_mm, rig[name], tattoo))
             for name in names
         ]
-        return bake(domain, wrong_by(model.neutral_mm, error_mm, seed), model.triangles, views)
+        mesh = wrong_by(model.neutral_mm, error_mm, seed)
+        return bake(domain, RayCaster(mesh, model.triangles), mesh, views)
 
     plain, tattooed, reference = baked(0, rig, 1), baked(1, rig, 2), baked(1, ["front"], 2)
-    opacity = feathered(domain, tattoo_mask(domain, tattooed, plain, 4.0, 6.0), 0.6, 1.0)
+    opacity = feather_mask(domain, tattoo_mask(domain, tattooed, plain, 4.0, 6.0), 0.6, 1.0)
     return {
-        mode: Paint(domain, plain, reference, opacity, Shading(mode), 0.8, 0.0, grain=False)
+        mode: InpaintInputs(
+            domain, plain, reference, opacity, ShadingSettings(mode), 0.8, 0.0, grain=False
+        )
         for mode in VARIANTS
     }
 
@@ -77,7 +81,7 @@ def rows_of(model: FaceModel, rig: dict, error_mm: float) -> Iterator[dict]:
         telea = cv2.inpaint(shown, mask, 4, cv2.INPAINT_TELEA)
         mesh = wrong_by(truth_mm, error_mm, 2)
         for mode, paint in painters.items():
-            ours = timed(partial(paint_frame, paint, inked, camera, mesh, model.triangles, (0,)))
+            ours = timed(partial(inpaint_frame, paint, inked, camera, mesh, model.triangles, (0,)))
             results = {"ours dB": to_display(ours.result.linear), "Telea dB": telea}
             yield (
                 {"mesh error mm": error_mm, "pose": pose, "shading": mode}

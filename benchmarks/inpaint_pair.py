@@ -42,10 +42,10 @@ from vermilion.imaging.draw import label, to_display
 from vermilion.imaging.images import read_image
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
-from vermilion.inpaint.grain import seed_of
-from vermilion.inpaint.opening import Evidence
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
+from vermilion.inpaint.grain import noise_seed
+from vermilion.inpaint.opening import OpeningSettings
+from vermilion.inpaint.shading import ShadingSettings
 from vermilion.storage.sequences import read_sequence
 
 LIPS = slice(48, 66)
@@ -67,7 +67,7 @@ class Scene:
         self.red = regions["vermilion_upper"] | regions["vermilion_lower"]
         self.plain = pair.image("plain", 0)
 
-    def _paint(self, take: Path) -> Paint:
+    def _paint(self, take: Path) -> InpaintInputs:
         config = InpaintConfig()
         cfg, how = config.domain, config.composite
         domain = lip_domain(self.template, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
@@ -75,10 +75,10 @@ class Scene:
         reference, more = read_texture(take / "inpaint/reference.exr", domain)
         light = config.shading.model_dump()
         gap_mm = light.pop("gap_mm")
-        return Paint(
-            domain, plain, reference, more["opacity"], Shading(**light), cfg.edge_mm,
+        return InpaintInputs(
+            domain, plain, reference, more["opacity"], ShadingSettings(**light), cfg.edge_mm,
             how.lens_px, how.rim_px, how.samples, how.grain, gap_mm,
-            Evidence(**config.opening.model_dump()),
+            OpeningSettings(**config.opening.model_dump()),
         )  # fmt: skip
 
     def vermilion(self, frame: int) -> np.ndarray:
@@ -94,9 +94,9 @@ class Scene:
             return to_display(read_image(self.inpainted / f"{frame:06d}.png"))
         paint = replace(self.paint, shading=replace(self.paint.shading, mode=mode))
         mesh = np.asarray(self.meshes[frame], dtype=np.float64)
-        seed = seed_of(0, "p1", "rom", frame)
+        seed = noise_seed(0, "p1", "rom", frame)
         return to_display(
-            paint_frame(paint, inked, self.camera, mesh, self.template.triangles, seed).linear
+            inpaint_frame(paint, inked, self.camera, mesh, self.template.triangles, seed).linear
         )
 
     def lips_px(self, frame: int) -> np.ndarray:

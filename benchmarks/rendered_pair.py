@@ -21,7 +21,8 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera, read_cameras, write_cameras
 from vermilion.imaging.images import read_image
 from vermilion.studio.capture_writer import image_path, write_images
-from vermilion.studio.take import StudioTakePlan, plan_of
+from vermilion.studio.take import StudioTakePlan, plan_take
+from vermilion.studio.take_settings import take_settings
 
 ROOT = Path(__file__).resolve().parents[1]
 FPS, CSV_STEP = 10, 3
@@ -92,16 +93,17 @@ class RenderedPair:
             "identity_spread", "seed", "slight_open", "ease_in_frames", "intensity",
             "head_turn_deg", "head_shift_mm",
         )  # fmt: skip
-        return plan_of(
-            FaceModel.load(self.results / "face_model" / "studio.npz"),
-            role="plain",
-            first=0,
-            last=self.n_frames - 1,
-            fps=FPS,
-            actor={"seed": SUBJECT_SEED, "identity": None},
-            performance=self.performance.model_dump(mode="json"),
+        values = {
+            "role": "plain",
+            "first": 0,
+            "last": self.n_frames - 1,
+            "fps": FPS,
+            "actor": {"seed": SUBJECT_SEED, "identity": None},
+            "performance": self.performance.model_dump(mode="json"),
             **{key: getattr(studio, key) for key in keys},
-        )
+        }
+        model = FaceModel.load(self.results / "face_model" / "studio.npz")
+        return plan_take(model, take_settings(values))
 
     def _render_bare(
         self, plan: StudioTakePlan, cameras: dict[str, Camera], take: str, seed: int

@@ -23,7 +23,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster
 from vermilion.studio.lighting import LIGHTINGS
 from vermilion.studio.look import look_of
-from vermilion.studio.render import Stage, render
+from vermilion.studio.render import Scene, render
 from vermilion.studio.rig import lips16_rig
 from vermilion.studio.surface import surface_of
 
@@ -58,14 +58,14 @@ def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
     model = FaceModel.load(arguments.model) if arguments.model else studio_model()
     vertices = model.neutral_mm
-    stage = Stage(model.triangles, surface_of(model), look_of(1, True), LIGHTINGS["rig"])
+    scene = Scene(model.triangles, surface_of(model), look_of(1, True), LIGHTINGS["rig"])
     cameras = lips16_rig(model, vertices, 735.0, (512, 512), (512, 512), 245.0, 105.0)
 
     def each_by_itself():
         for name, camera in cameras.items():
-            render(stage, vertices, {name: camera})
+            render(scene, vertices, {name: camera})
 
-    frame = timed(lambda: render(stage, vertices, cameras), rounds=3, warm_up=True)
+    frame = timed(lambda: render(scene, vertices, cameras), rounds=3, warm_up=True)
     apart = timed(each_by_itself, rounds=3)
     rays = timed(lambda: cast_rays(model, cameras), rounds=3)
     peer = timed(lambda: cast_trimesh_rays(model, cameras))

@@ -140,7 +140,9 @@ def run_database(root):
         },
         input={
             "layers": [f / f"layers/{c}.npz" for f in chunk_files for c in CHUNKS],
-            "features": [f / f"features/{c}.npz" for f in chunk_files for c in CHUNKS],
+            "features": [
+                root / f"takes/{s}/rom/features/{c}.npz" for s in SUBJECTS for c in CHUNKS
+            ],
             "correspondence": [root / f"subjects/{s}/correspondence.npz" for s in SUBJECTS],
             "identity": [root / f"subjects/{s}/identity.npz" for s in SUBJECTS],
             "neutral_pair": [f / "neutral_pair.npz" for f in chunk_files],

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
+
 import numpy as np
 import pytest
 
 from tests import lip_patch
 from tests.stages.run_script import run_script
 from vermilion.geometry.camera import write_cameras
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.images import read_image, write_image
 from vermilion.storage.sequences import write_sequence
@@ -49,14 +53,18 @@ def capture(tmp_path_factory):
         input={n: root / f for n, f in shared().items() if n != "plain"},
         output={"texture": root / "plain.exr", "overlay": root / "plain.png"},
     )
+    reference_of(root, root)
+    return root
+
+
+def reference_of(root, out) -> None:
     run_script(
         "inpaint/inpaint_reference",
         wildcards={"subject": "s1", "take": "rom"},
         params={"cfg": CFG, "neutral": 0, "source": str(root / "rom")},
         input={n: root / f for n, f in shared().items()},
-        output={"reference": root / "reference.exr", "overlay": root / "reference.png"},
+        output={"reference": out / "reference.exr", "overlay": out / "reference.png"},
     )
-    return root
 
 
 def shared() -> dict[str, str]:
@@ -112,6 +120,52 @@ def test_chunks_change_no_bit(capture, tmp_path):
     for part in parts:
         for path in part.iterdir():
             assert path.read_bytes() == (whole / path.name).read_bytes()
+
+
+def test_a_frame_is_read_once_and_its_mesh_is_one_ray_caster(capture, tmp_path, monkeypatch):
+    reads, meshes, converted = Counter(), Counter(), Counter()
+    counted(monkeypatch, "read_image", lambda path, **_: reads.update([str(path)]))
+    counted(monkeypatch, "linear_to_srgb", lambda x: converted.update(image_bytes(x)))
+    whole = RayCaster.__init__
+
+    def build(self, vertices_mm, triangles):
+        meshes.update([np.asarray(vertices_mm, dtype=np.float64).tobytes()])
+        whole(self, vertices_mm, triangles)
+
+    monkeypatch.setattr(RayCaster, "__init__", build)
+    paint(capture, tmp_path, [0, 1, 2])
+    assert set(reads.values()) == {1} and len(reads) == 3
+    assert set(meshes.values()) == {1}
+    assert len(meshes) == 3 + 1  # the frames' meshes, and the chart of the domain
+    assert set(converted.values()) == {1}  # no part of an image is converted to sRGB twice
+
+
+def test_the_reference_bakes_each_view_once(capture, tmp_path, monkeypatch):
+    reads, weighed = Counter(), Counter()
+    counted(monkeypatch, "read_image", lambda path, **_: reads.update([str(path)]))
+    counted(monkeypatch, "_view_weight", lambda *args: weighed.update([args[2].name]))
+    reference_of(capture, tmp_path)
+    assert set(reads.values()) == {1}
+    assert weighed == dict.fromkeys(lip_patch.cameras(), 1)
+    assert (tmp_path / "reference.exr").read_bytes() == (capture / "reference.exr").read_bytes()
+
+
+def image_bytes(values) -> list[bytes]:
+    """The content of an image or a crop; nothing of the few colours of a palette."""
+    return [np.asarray(values).tobytes()] if np.size(values) > 1000 else []
+
+
+def counted(monkeypatch, name: str, count) -> None:
+    """Call `count` with the arguments of every call of a function of Vermilion, wherever imported."""
+    for module in list(sys.modules.values()):
+        if getattr(module, "__name__", "").startswith("vermilion.") and name in vars(module):
+            function = getattr(module, name)
+
+            def wrapper(*args, function=function, **kwargs):
+                count(*args, **kwargs)
+                return function(*args, **kwargs)
+
+            monkeypatch.setattr(module, name, wrapper)
 
 
 def test_a_bad_frame_is_flagged_and_the_rest_goes_on(capture, tmp_path):

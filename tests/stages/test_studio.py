@@ -19,10 +19,11 @@ from vermilion.studio.capture_writer import (
     write_labels,
     write_truth,
 )
-from vermilion.studio.labels import contours, label_frames, view_mouth
+from vermilion.studio.labels import label_frames, lip_contours, view_mouth
 from vermilion.studio.render import render
 from vermilion.studio.surface import surface_of
-from vermilion.studio.take import cameras_of, plan_of
+from vermilion.studio.take import cameras_of, plan_take
+from vermilion.studio.take_settings import take_settings
 
 SIZES = {
     "camera_distance_mm": 735.0,
@@ -47,14 +48,13 @@ def surface(model):
 
 
 def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights="rig"):
-    return plan_of(
-        model,
-        role=role,
-        first=0,
-        last=last,
-        fps=30.0,
-        actor={"seed": 7, "identity": None},
-        performance={
+    values = {
+        "role": role,
+        "first": 0,
+        "last": last,
+        "fps": 30.0,
+        "actor": {"seed": 7, "identity": None},
+        "performance": {
             "performance": performance,
             "seed": seed,
             "poses": 0,
@@ -64,14 +64,15 @@ def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights=
             "csv_fps": 30.0,
             "lights": lights,
         },
-        identity_spread=0.7,
-        seed=0,
-        slight_open=0.08,
-        ease_in_frames=6,
-        intensity=1.0,
-        head_turn_deg=2.5,
-        head_shift_mm=2.0,
-    )
+        "identity_spread": 0.7,
+        "seed": 0,
+        "slight_open": 0.08,
+        "ease_in_frames": 6,
+        "intensity": 1.0,
+        "head_turn_deg": 2.5,
+        "head_shift_mm": 2.0,
+    }
+    return plan_take(model, take_settings(values))
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +86,7 @@ def cameras(rom):
 
 
 def images(take, surface, cameras, index=0):
-    return render(take.stage(index, surface, **RAYS), take.vertices_mm(index), cameras)
+    return render(take.scene(index, surface, **RAYS), take.vertices_mm(index), cameras)
 
 
 def open_mouth(model, weight):
@@ -133,7 +134,7 @@ def test_paint_ends_where_the_labelled_contour_runs(model, surface, rom, cameras
     changed = (np.abs(painted - skin).max(axis=2) > 0.02).astype(np.uint8)
     loops, _ = cv2.findContours(changed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     edge = np.concatenate([loop[:, 0] for loop in loops]) + 0.5
-    label = contours(model, surface, rom.vertices_mm(0), camera)["outer"]
+    label = lip_contours(model, surface, rom.vertices_mm(0), camera)["outer"]
     loop = label.astype(np.float32).reshape(-1, 1, 2)
     depth = np.array([cv2.pointPolygonTest(loop, tuple(map(float, p)), True) for p in edge])
     outline = np.abs(depth)[np.abs(depth) < 6]
@@ -163,7 +164,7 @@ def test_the_inner_label_has_the_height_of_the_opening(model, surface, cameras):
     middle = model.landmarks[[60, 64]]  # middle of the inner loop, upper and lower
     for weight in (0.3, 0.7):
         vertices = open_mouth(model, weight)
-        inner = contours(model, surface, vertices, camera)["inner"]
+        inner = lip_contours(model, surface, vertices, camera)["inner"]
         ends = camera.project(vertices[middle])
         near = np.abs(inner[:, 0] - ends[:, 0].mean()) < 2.0
         gap = np.ptp(inner[near, 1])
@@ -172,7 +173,7 @@ def test_the_inner_label_has_the_height_of_the_opening(model, surface, cameras):
 
 def test_the_inner_label_of_closed_lips_is_a_line(model, surface, cameras):
     vertices = open_mouth(model, 0.0)
-    inner = contours(model, surface, vertices, cameras["face2"])["inner"]
+    inner = lip_contours(model, surface, vertices, cameras["face2"])["inner"]
     area = cv2.contourArea(inner.astype(np.float32))
     assert area / np.ptp(inner[:, 0]) < 1.0  # px of mean height
 

@@ -9,7 +9,7 @@ from vermilion.report.mesh_sheets import (
     clay_columns,
     crop,
     error_columns,
-    sheet,
+    render_sheet,
     stretch_columns,
     surface_stretch,
 )
@@ -48,7 +48,7 @@ def test_a_sheet_has_a_row_a_view_and_leaves_holes_white():
     )
     centre = np.zeros((2, 3))
     image = np.full((40, 40, 3), 7, np.uint8)
-    found = sheet(columns, [3, 9], centre, 150.0, 40, [image, image])
+    found = render_sheet(columns, [3, 9], centre, 150.0, 40, [image, image])
     assert found.shape == (4 * 40, 4 * 40, 3)
     assert (found[:40, :40] == 7).all()
     whole, holed = (found[rows, 40:80] < 250 for rows in (slice(80, 120), slice(0, 40)))

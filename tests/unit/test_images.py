@@ -1,7 +1,10 @@
 """Images and frames: linear light, exact frames, errors that name the place."""
 
+import time
+
 import cv2
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,13 +50,28 @@ def test_channels_keep_their_names(tmp_path):
     assert np.abs(back["inner"] - inner).max() < 1e-3
 
 
-def test_same_image_gives_the_same_bytes(tmp_path):
+def test_the_same_image_gives_the_same_bytes_at_another_time(tmp_path):
     linear = np.random.default_rng(0).uniform(0, 1, (16, 16, 3))
-    for name in ("a", "b"):
-        write_image(tmp_path / f"{name}.png", linear)
-        write_image(tmp_path / f"{name}.exr", linear)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+    suffixes = (".png", ".jpg", ".tif", ".exr", ".hdr")
+    for name in ("first", "second"):
+        for suffix in suffixes:
+            write_image(tmp_path / f"{name}{suffix}", linear)
+        write_channels(tmp_path / f"{name}_map.exr", {"inner": linear[..., 0]})
+        write_video(tmp_path / f"{name}.mp4", [np.rint(linear * 255).astype(np.uint8)] * 3, 25)
+        time.sleep(1.01)  # headers give the time in seconds
+    firsts = sorted(tmp_path.glob("first*"))
+    assert len(firsts) == len(suffixes) + 2
+    for first in firsts:
+        second = first.with_name(first.name.replace("first", "second"))
+        assert first.read_bytes() == second.read_bytes(), first.name
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".tif", ".exr"])
+def test_an_image_names_no_time_host_user_or_program(tmp_path, suffix):
+    write_image(tmp_path / f"a{suffix}", np.zeros((4, 4, 3)))
+    image = oiio.ImageInput.open(str(tmp_path / f"a{suffix}"))
+    named = {attribute.name for attribute in image.spec().extra_attribs}
+    assert not named & {"DateTime", "HostComputer", "Artist", "Copyright", "Software"}
 
 
 def test_truncated_image_is_named(tmp_path):

@@ -8,7 +8,7 @@ from tests import lip_patch
 from vermilion.multiview.drift import ALL, DriftSettings, Origin, carry, drift_rows, neighbours
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.views import Frame, make_view
-from vermilion.report.multiview_page import Findings, Sheet, choose_frames, report_page
+from vermilion.report.multiview_page import FrameSheet, TakeFindings, choose_frames, report_page
 
 POSE = (0.7, 0.02)
 SETTINGS = DriftSettings(scale=1.0, min_agreement=0.3, ray_stride_px=1)
@@ -105,7 +105,7 @@ def test_a_take_of_a_neutral_alone_shows_it():
 def test_sheets_shrink_until_the_page_keeps_to_its_size(scene):
     origin = scene[0]
     across = rows(origin, origin.frame, lip_patch.vertices_at(0.0, 0.0)).reset_index()
-    found = Findings("s1/rom", 0, ["front"], pd.DataFrame(), pd.DataFrame(), across)
+    found = TakeFindings("s1/rom", 0, ["front"], pd.DataFrame(), pd.DataFrame(), across)
     noise = np.random.default_rng(0).integers(0, 255, (900, 1400, 3), dtype=np.uint8)
-    sheets = [Sheet(number, "noise", noise) for number in range(3)]
+    sheets = [FrameSheet(number, "noise", noise) for number in range(3)]
     assert len(report_page(found, sheets, page_mb=0.8)) < 0.8e6

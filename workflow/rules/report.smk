@@ -74,12 +74,12 @@ def measured_against(take):
 
 
 def regressor_rows():
-    """What the report says each regressor was trained on and is judged by."""
+    """What the report says each regressor was trained and is measured on."""
     rows = []
     for name in regressor_names():
         people = trained_on(name, trained_subjects())
         training = [take for take in takes_that_train() if take.subject in people]
-        judged = [
+        measured = [
             take.name
             for take in evaluated_takes()
             if name in regressors_of(take.subject, trained_subjects())
@@ -89,7 +89,7 @@ def regressor_rows():
                 "regressor": name,
                 "trained_on": ", ".join(take.name for take in training),
                 "frames": sum(len(take.train_frames()) for take in training),
-                "judged_on": ", ".join(judged),
+                "measured_on": ", ".join(measured),
             }
         )
     return rows

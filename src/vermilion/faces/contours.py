@@ -21,7 +21,10 @@ UPPER_MIDDLE = 50
 def edge_graph(
     vertices_mm: np.ndarray, triangles: np.ndarray, cost: np.ndarray | None = None
 ) -> sparse.csr_matrix:
-    """(V, V) symmetric graph of edge lengths in mm; `cost` (V,) multiplies by its mean."""
+    """Graph of edge lengths, (V, V) symmetric, mm.
+
+    `vertices_mm` (V, 3), `triangles` (T, 3). `cost` (V,) multiplies each edge by its ends' mean.
+    """
     edges = unique_edges(triangles)
     length = np.linalg.norm(vertices_mm[edges[:, 0]] - vertices_mm[edges[:, 1]], axis=1)
     length = np.maximum(length, 1e-6)
@@ -33,7 +36,7 @@ def edge_graph(
 
 
 def closed_loop(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
-    """Closed vertex loop (n,) through the waypoints in order, by shortest paths along edges."""
+    """Closed vertex loop (n,) through `waypoints` (m,) in order, by shortest paths along edges."""
     waypoints = np.asarray(waypoints)
     _, previous = csgraph.dijkstra(graph, indices=waypoints, return_predecessors=True)
     loop: list[int] = []
@@ -58,10 +61,17 @@ def smooth_loop(
 ) -> np.ndarray:
     """Closed vertex loop (n,) through the waypoints that keeps to splines through them.
 
-    There are two splines, as a mouth has corners: from the first waypoint over the upper lip to
-    waypoint number `left_corner`, and back under the lower. Shortest paths alone would cut across
-    rows of the mesh where the loop bends; here an edge costs the more, the further it lies from
-    the splines.
+    A mouth has corners, so there are two splines: from the first waypoint over the upper lip to
+    waypoint number `left_corner`, and back under the lower lip. Shortest paths alone would cut
+    across rows of the mesh where the loop bends; here the cost of an edge grows with its distance
+    from the splines.
+
+    Args:
+        vertices_mm: (V, 3) mm.
+        triangles: (T, 3).
+        waypoints: (m,) vertices.
+        left_corner: number of the waypoint at the subject's left corner.
+        tolerance_mm: distance from the splines at which the cost doubles.
     """
     closed = np.append(waypoints, waypoints[0])
     halves = (closed[: left_corner + 1], closed[left_corner:])
@@ -72,7 +82,10 @@ def smooth_loop(
 
 
 def without_spurs(loop: np.ndarray) -> np.ndarray:
-    """A closed vertex loop without the places where it runs to a vertex and straight back."""
+    """A closed vertex loop (m,) without places where it runs to a vertex and straight back.
+
+    `loop` (n,) vertices.
+    """
     vertices = loop.tolist()
     index = 0
     while index < len(vertices) and len(vertices) > 3:
@@ -116,12 +129,18 @@ def contour_halves(
 
 
 def geodesic_distance(graph: sparse.spmatrix, sources: np.ndarray) -> np.ndarray:
-    """Distance along edges of every vertex to the nearest source, (V,) mm; inf where apart."""
+    """Distance along edges of every vertex to the nearest source, (V,) mm; inf where apart.
+
+    `sources` (n,) vertices.
+    """
     return csgraph.dijkstra(graph, indices=np.unique(sources), min_only=True)
 
 
 def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int) -> np.ndarray:
-    """Vertices on the same side of a closed loop as `seed`, (V,) bool, the loop not counted."""
+    """Vertices on the same side of a closed loop as `seed`, (V,) bool, the loop not counted.
+
+    `triangles` (T, 3), `loop` (n,) vertices.
+    """
     edges = unique_edges(triangles)
     on_loop = np.zeros(n_vertices, dtype=bool)
     on_loop[loop] = True
@@ -134,10 +153,11 @@ def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int
 def upper_side(
     graph: sparse.spmatrix, outer: np.ndarray, inner: np.ndarray, landmarks: np.ndarray
 ) -> np.ndarray:
-    """Which vertices belong to the upper lip's side (True) and which to the lower's, (V,) bool.
+    """Vertices of the upper lip's side (True) and of the lower lip's side, (V,) bool.
 
-    A vertex belongs to the side whose part of the two contours is nearer along the edges; the
-    `landmarks` (66,) tell the parts, so that a loop may start anywhere and run either way.
+    A vertex belongs to the side whose part of the two contours is nearer along the edges. The loops
+    `outer` (n,) and `inner` (m,) may start anywhere and run either way: `landmarks` (66,) tell where
+    their parts are.
     """
     ends = landmarks[[RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE]]
     distance = csgraph.dijkstra(graph, indices=ends)

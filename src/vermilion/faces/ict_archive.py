@@ -154,9 +154,11 @@ def _tar_contents(path: Path) -> dict[str, bytes]:
     """Files of the archive by name, in one pass (a compressed archive cannot seek cheaply)."""
     with tarfile.open(path) as archive:
         return {
-            Path(member.name).name: archive.extractfile(member).read()
+            Path(member.name).name: content.read()
             for member in archive
-            if member.isfile() and Path(member.name).parent.name == "FaceXModel"
+            if Path(member.name).parent.name == "FaceXModel"
+            and member.isfile()
+            and (content := archive.extractfile(member)) is not None
         }
 
 

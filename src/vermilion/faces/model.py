@@ -89,7 +89,10 @@ class FaceModel:
         )
 
     def vertices(self, identity: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
-        """Mesh of expression weights (K,) -> (V, 3) mm, or (F, K) -> (F, V, 3) mm."""
+        """Mesh of expression weights, mm.
+
+        `identity` (I,) coefficients, None: the mean. `weights` (K,) -> (V, 3), (F, K) -> (F, V, 3).
+        """
         weights = np.asarray(weights, dtype=np.float64)
         offsets = np.tensordot(weights, self.expressions_mm.astype(np.float64), axes=(-1, 0))
         return self.neutral_of(identity) + offsets

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.faces.procedural_head import chart_of, locate
+from vermilion.faces.procedural_head import chart_at, chart_of
 
 # Jaw, subject's left from the ear to the chin: azimuth and polar angle in degrees.
 _JAW = [(86, 87), (84, 96), (81, 105), (77, 114), (70, 121), (56, 125), (38, 127.5), (20, 128.5)]
@@ -24,7 +24,7 @@ def anchor_chart() -> dict[int, complex]:
     brow = np.array(_BROW_MM, dtype=float)
     base = np.array(_NOSE_BASE_MM, dtype=float)
     frontal = np.concatenate([brow[::-1] * [-1, 1], brow, _BRIDGE_MM, base * [-1, 1], base[1::-1]])
-    points = np.concatenate([chart_of(jaw[:, 1], jaw[:, 0]), locate(frontal)])
+    points = np.concatenate([chart_of(jaw[:, 1], jaw[:, 0]), chart_at(frontal)])
     return dict(enumerate(points))
 
 

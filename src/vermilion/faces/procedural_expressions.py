@@ -20,13 +20,17 @@ JAW_MOTIONS: dict[str, tuple[float, tuple[float, float, float]]] = {
 
 
 def jaw_motion_of(f: Fields, name: str) -> np.ndarray:
+    """(V, 3) mm: the jaw bone moves as `JAW_MOTIONS` says, and the lips with it."""
     open_rad, shift = JAW_MOTIONS[name]
     narrower = -2.5 * f.u**3 * (open_rad / JAW_OPEN_RAD)  # an opening mouth draws its corners in
     return f.jaw(open_rad, shift) + f.lips(narrower, 0.0, 0.0)
 
 
 def mouth_close(f: Fields) -> np.ndarray:
-    """Undo jawOpen's parting of the lips: together at weight 1 they give closed lips, open teeth."""
+    """(V, 3) mm: undoes the parting of the lips by jawOpen.
+
+    Together at weight 1 the two give closed lips and open teeth.
+    """
     meeting = lip_point(loop_theta(), np.ones(len(f.u)))
     motion = jaw_motion(meeting, JAW_OPEN_RAD, (0.0, 0.0, 0.0))
     curve = (JAW_AT_CORNERS - f.jaw_loop)[:, None] * motion
@@ -34,6 +38,7 @@ def mouth_close(f: Fields) -> np.ndarray:
 
 
 def mouth_pucker(f: Fields, rolls: bool) -> np.ndarray:
+    """(V, 3) mm: the corners come together and the lips forward, as for a kiss."""
     out = f.lips(
         -11.0 * f.u * (1 - 0.1 * f.u**2),
         0.8 * f.upper - 0.4 * f.lower,
@@ -45,16 +50,19 @@ def mouth_pucker(f: Fields, rolls: bool) -> np.ndarray:
 
 
 def mouth_funnel(f: Fields, rolls: bool) -> np.ndarray:
+    """(V, 3) mm: open and rounded lips, as for a long o."""
     out = f.lips(-7.5 * f.u, 4.2 * f.upper - 6.0 * f.lower, 5.0 + 2.0 * f.u**2, 46.0)
     return out + (f.roll(-0.5 * f.middle) if rolls else 0.0)
 
 
 def mouth_sideways(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: the whole mouth to one `side` (+1: the subject's left)."""
     lead = 0.5 * (1 + side * f.u)
     return f.lips(side * (8.0 - 2.0 * lead), 1.2 * f.corner(side), -2.5 * f.corner(side), 46.0)
 
 
 def mouth_smile(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one corner out and up, and the cheek above it (`side` +1: the subject's left)."""
     c = f.corner(side)
     lips = f.lips(
         side * 7.0 * c, 6.5 * c + 0.4 * f.upper * f.half(side), -4.5 * c - 0.6 * f.half(side), 52.0
@@ -64,22 +72,26 @@ def mouth_smile(f: Fields, side: float) -> np.ndarray:
 
 
 def mouth_frown(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one corner down."""
     c = f.corner(side)
     return f.lips(side * 1.5 * c, -7.0 * c, -1.0 * c, 40.0)
 
 
 def mouth_stretch(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one corner outwards and back."""
     c = f.corner(side)
     lips = f.lips(side * 8.0 * c, -3.0 * c, -5.0 * c - 0.5 * f.half(side), 46.0)
     return lips + f.thin(0.18 * f.half(side) * f.middle)
 
 
 def mouth_dimple(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one corner pulled in."""
     c = f.corner(side) ** 2
     return f.lips(side * 4.0 * c, 1.0 * c, -4.5 * c, 30.0)
 
 
 def mouth_press(f: Fields, side: float, rolls: bool) -> np.ndarray:
+    """(V, 3) mm: one side of the lips pressed together."""
     half = f.half(side) * f.middle
     lips = f.lips(0.0, 0.0, -1.0 * half, 22.0)
     roll = f.roll(0.25 * half) if rolls else 0.0
@@ -87,17 +99,23 @@ def mouth_press(f: Fields, side: float, rolls: bool) -> np.ndarray:
 
 
 def mouth_upper_up(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one side of the upper lip raised."""
     lift = f.half(side) * f.upper
     return f.lips(side * 0.6 * lift, 6.0 * lift, 0.8 * lift, 34.0) + f.roll(-0.15 * lift)
 
 
 def mouth_lower_down(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one side of the lower lip lowered."""
     drop = f.half(side) * f.lower
     return f.lips(side * 0.8 * drop, -6.5 * drop, 0.5 * drop, 34.0) + f.roll(-0.12 * drop)
 
 
 def mouth_roll(f: Fields, lip: np.ndarray, sign: float, inward: bool) -> np.ndarray:
-    """`sign` +1 for the upper lip. Inward: the red turns into the mouth; outward: it everts."""
+    """(V, 3) mm: a lip turns about its length.
+
+    `lip` (N_LOOP,) are its weights, `sign` is +1 for the upper lip. Inward, the red turns into the
+    mouth; outward, it everts.
+    """
     lip = f.widened(lip)
     if not inward:
         return f.roll(-0.5 * lip, 14.0) + f.lips(0.0, sign * 2.2 * lip, 2.0 * lip, 26.0)
@@ -108,10 +126,12 @@ def mouth_roll(f: Fields, lip: np.ndarray, sign: float, inward: bool) -> np.ndar
 
 
 def mouth_shrug(f: Fields, lip: np.ndarray, up: float) -> np.ndarray:
+    """(V, 3) mm: a lip, by its weights `lip` (N_LOOP,), raised by `up` mm."""
     return f.lips(0.0, up * lip, 1.5 * lip, 40.0)
 
 
 def cheek_puff(f: Fields) -> np.ndarray:
+    """(V, 3) mm: both cheeks blown up."""
     out = f.lips(0.0, 0.0, 2.0 + 2.5 * f.u**2, 40.0)
     for side in (1.0, -1.0):
         out = out + f.bumped(side * 47, -36, 15, 15, (side * 6.5, 0.0, 6.0))
@@ -119,6 +139,7 @@ def cheek_puff(f: Fields) -> np.ndarray:
 
 
 def nose_sneer(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one wing of the nose raised, and the lip below it."""
     lift = f.half(side) * f.upper
     return f.bumped(side * 14, -8, 7, 8, (side * 0.6, 3.4, 0.6)) + f.lips(
         0.0, 2.2 * lift, 0.4 * lift, 26.0
@@ -126,19 +147,23 @@ def nose_sneer(f: Fields, side: float) -> np.ndarray:
 
 
 def cheek_squint(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one cheek raised towards the eye."""
     return f.bumped(side * 40, 3, 14, 9, (0.0, 4.0, 2.5))
 
 
 def brow_inner_up(f: Fields) -> np.ndarray:
+    """(V, 3) mm: the inner ends of both brows raised."""
     out = f.bumped(11, 48, 11, 8, (-0.5, 5.0, 0.6))
     return out + f.bumped(-11, 48, 11, 8, (0.5, 5.0, 0.6))
 
 
 def brow_down(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: one brow lowered."""
     return f.bumped(side * 22, 46, 14, 7, (-side * 2.2, -5.0, 0.8))
 
 
 def brow_outer_up(f: Fields, side: float) -> np.ndarray:
+    """(V, 3) mm: the outer end of one brow raised."""
     return f.bumped(side * 40, 46, 11, 8, (0.0, 5.0, 0.3))
 
 
@@ -149,10 +174,12 @@ def _sided(name: str, build: Callable[[Fields, float], np.ndarray]) -> dict:
     }
 
 
+def _jaw(name: str) -> Callable[[Fields], np.ndarray]:
+    return lambda f: jaw_motion_of(f, name)
+
+
 def _library(rolls: bool) -> dict[str, Callable[[Fields], np.ndarray]]:
-    shapes: dict[str, Callable[[Fields], np.ndarray]] = {
-        name: (lambda f, name=name: jaw_motion_of(f, name)) for name in JAW_MOTIONS
-    }
+    shapes: dict[str, Callable[[Fields], np.ndarray]] = {name: _jaw(name) for name in JAW_MOTIONS}
     shapes["mouthClose"] = mouth_close
     shapes["mouthPucker"] = lambda f: mouth_pucker(f, rolls)
     shapes["mouthFunnel"] = lambda f: mouth_funnel(f, rolls)
@@ -183,7 +210,7 @@ def _library(rolls: bool) -> dict[str, Callable[[Fields], np.ndarray]]:
 
 
 STUDIO_SHAPES = tuple(_library(True))
-#: The tracker knows no rolls, no press, no funnel, no shrugs, no dimples: the correction's work.
+#: The tracker has no rolls, press, funnel, shrugs or dimples: those are left to the correction.
 TRACKER_SHAPES = tuple(
     name
     for name in STUDIO_SHAPES

@@ -56,7 +56,7 @@ class Fields:
         return np.clip(1.0 - self.u**2, 0.0, 1.0) ** 0.8
 
     def widened(self, lip: np.ndarray) -> np.ndarray:
-        """(N_LOOP,) the whole of a lip, given its weights `upper` or `lower`."""
+        """The whole of a lip, (N_LOOP,), given its weights `lip` (N_LOOP,), `upper` or `lower`."""
         return np.where(lip > 0, 1.0 - np.abs(self.u) ** 4, 0.0)
 
     def corner(self, side: float) -> np.ndarray:
@@ -101,16 +101,24 @@ class Fields:
         return self.mesh.spread @ curve
 
     def lips(
-        self, dx: np.ndarray, dy: np.ndarray, dz: np.ndarray, reach_mm: float = 38.0
+        self,
+        dx: np.ndarray | float,
+        dy: np.ndarray | float,
+        dz: np.ndarray | float,
+        reach_mm: float = 38.0,
     ) -> np.ndarray:
-        """Move the lips by curves (N_LOOP,) or numbers, the skin after them."""
+        """Move the lips by curves, and the skin after them, (V, 3) mm.
+
+        `dx` (N_LOOP,), `dy` (N_LOOP,) and `dz` (N_LOOP,) mm along the lips' loop; a number holds for
+        all of it.
+        """
         curve = np.stack(np.broadcast_arrays(dx, dy, dz, self.u)[:3], axis=-1)
         return self.carried(curve) * self.fade(reach_mm)[:, None]
 
     def roll(self, angle_rad: np.ndarray, reach_mm: float = 11.0) -> np.ndarray:
-        """Turn each cross-section of the lips about an axis within the lip by a curve of angles.
+        """Turn each cross-section of the lips about an axis within the lip, (V, 3) mm.
 
-        Positive turns the red inwards on both lips.
+        `angle_rad` (N_LOOP,); positive turns the red inwards on both lips.
         """
         theta = loop_theta()
         step = 1e-3
@@ -138,7 +146,10 @@ class Fields:
         return meeting
 
     def thin(self, share: np.ndarray, reach_mm: float = 9.0) -> np.ndarray:
-        """Draw the lips together towards the line where they meet, by a curve of shares."""
+        """Draw the lips together towards the line where they meet, (V, 3) mm.
+
+        `share` (N_LOOP,) of the way, along the lips' loop.
+        """
         meeting = self.carried(lip_point(loop_theta(), np.ones(N_LOOP)))
         fade = np.clip(1.0 - (self.mesh.distance_mm / reach_mm) ** 2, 0, 1) ** 3 * self._inside
         inside = 1.0 - smoothstep(1.0, 1.6, self.mesh.s)
@@ -175,13 +186,16 @@ class Fields:
         return near * self.carried(self.jaw_loop) + (1.0 - near) * body * neck
 
     def jaw(self, open_rad: float = 0.0, shift_mm: tuple[float, float, float] = (0, 0, 0)):
-        """Turn the jaw about its hinge and shift it."""
+        """Turn the jaw about its hinge and shift it, (V, 3) mm."""
         return self.jaw_weight[:, None] * jaw_motion(self.mesh.point_mm, open_rad, shift_mm)
 
     # -- lids -------------------------------------------------------------------------------------
 
     def lids(self, side: float, closing: float) -> np.ndarray:
-        """Turn both lids about the eyeball until they meet (`closing` 1); negative widens."""
+        """Turn both lids of an eye about the eyeball, (V, 3) mm.
+
+        They meet at `closing` 1; a negative value widens the eye.
+        """
         centre = EYE_CENTRE_MM * np.array([side, 1, 1])
         x, y, z = self.mesh.point_mm.T
         t = np.clip((side * x - EYE_CENTRE_MM[0] - 0.3) / 13.6, -1, 1)
@@ -206,7 +220,10 @@ class Fields:
 def jaw_motion(
     point: np.ndarray, open_rad: float, shift_mm: tuple[float, float, float]
 ) -> np.ndarray:
-    """Displacement (V, 3) of the jaw bone: a turn about the hinge, sliding forward as it opens."""
+    """Displacement (V, 3) mm of the jaw bone: a turn about the hinge, sliding forward as it opens.
+
+    `point` (V, 3) mm in the head frame.
+    """
     arm = point - JAW_HINGE_MM
     cosine, sine = np.cos(open_rad), np.sin(open_rad)
     turned = np.stack(

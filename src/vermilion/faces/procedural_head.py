@@ -76,23 +76,32 @@ _NOSE_WIDTH_AT = CubicSpline(_NOSE_WIDTH[:, 0], _NOSE_WIDTH[:, 1])
 
 
 def bump(x: np.ndarray, y: np.ndarray, x0: float, y0: float, sx: float, sy: float) -> np.ndarray:
-    """Gaussian of height 1 at (x0, y0) with deviations sx, sy (mm)."""
+    """Gaussian of height 1 at (x0, y0) with deviations sx, sy (mm).
+
+    `x` and `y` (N,) mm; returns (N,).
+    """
     return np.exp(-0.5 * (((x - x0) / sx) ** 2 + ((y - y0) / sy) ** 2))
 
 
 def smoothstep(low: float, high: float, value: np.ndarray) -> np.ndarray:
-    """0 at `low`, 1 at `high` (which may be the smaller), twice differentiable."""
+    """0 at `low`, 1 at `high` (which may be the smaller), twice differentiable.
+
+    `value` (...,); returns (...,).
+    """
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return t * t * t * (t * (6.0 * t - 15.0) + 10.0)
 
 
 def smooth_max(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
-    """Maximum with its crease rounded over about `width`."""
+    """Maximum of `a` (...,) and `b` (...,), its crease rounded over about `width`; (...,)."""
     return 0.5 * (a + b + np.sqrt((a - b) ** 2 + width * width))
 
 
 def chart_angles(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Polar angle from the top and azimuth from the front (radians) of chart points w (complex)."""
+    """Polar angle from the top and azimuth from the front of chart points.
+
+    `w` (N,) complex; returns two arrays (N,) in radians.
+    """
     centre = np.tan(MOUTH_ANGLE / 2) / np.tan(RIM_ANGLE / 2)
     turned = 1j * w
     z = (turned + centre) / (1 + centre * turned)
@@ -102,7 +111,10 @@ def chart_angles(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def chart_of(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-    """Inverse of `chart_angles`: the chart point (N,) complex of angles (radians)."""
+    """Inverse of `chart_angles`: chart points (N,) complex.
+
+    `polar` (N,) and `azimuth` (N,) in radians.
+    """
     grid = np.linspace(-np.pi, np.pi, 4001)
     plain = np.interp(azimuth, grid + _FRONTAL_STRETCH * np.sin(2 * grid), grid)
     rim = np.tan(RIM_ANGLE / 2)
@@ -112,7 +124,7 @@ def chart_of(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
 
 
 def base_point(w: np.ndarray) -> np.ndarray:
-    """The head without features, chart (N,) complex -> (N, 3) mm."""
+    """The head without features, `w` (N,) complex in the chart -> (N, 3) mm."""
     polar, azimuth = chart_angles(w)
     cosine, sine = np.cos(azimuth), np.sin(azimuth)
     exponent = 2.0 / _ROUNDNESS_AT(polar)[..., 0]
@@ -159,7 +171,7 @@ def _face_relief(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def skin_point(w: np.ndarray) -> np.ndarray:
-    """The skin of the mean head, chart (N,) complex -> (N, 3) mm."""
+    """The skin of the mean head, `w` (N,) complex in the chart -> (N, 3) mm."""
     point = base_point(w)
     x, y, z = np.abs(point[..., 0]), point[..., 1], point[..., 2]
     front = smoothstep(-5.0, 35.0, z)
@@ -180,7 +192,7 @@ def skin_point(w: np.ndarray) -> np.ndarray:
     return point
 
 
-def locate(xy: np.ndarray, steps: int = 12) -> np.ndarray:
+def chart_at(xy: np.ndarray, steps: int = 12) -> np.ndarray:
     """Chart points whose skin lies at frontal positions `xy` (N, 2) mm; front of the face only.
 
     Newton's method with numerical derivatives on the featureless head, which shares x, and y but

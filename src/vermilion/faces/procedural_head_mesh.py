@@ -112,12 +112,12 @@ def build_head_mesh(layout: Layout) -> HeadMesh:
         triangles.append(strip if sign > 0 else strip[:, [0, 2, 1]])
 
     point = np.concatenate(points)
-    chart, theta, s = (np.concatenate(parts) for parts in (charts, thetas, depths))
+    chart, theta, depth = (np.concatenate(parts) for parts in (charts, thetas, depths))
     spread, distance = _spread(point, theta)
     meeting = rings[1 + steps.index(1.0)]
     return HeadMesh(
-        point, np.concatenate(triangles), chart, theta, s, spread, distance,
-        rings[0], meeting, sheet.eyes, sheet.anchors, _uv(chart, theta, s, spread, distance),
+        point, np.concatenate(triangles), chart, theta, depth, spread, distance,
+        rings[0], meeting, sheet.eyes, sheet.anchors, _uv(chart, theta, depth, spread, distance),
     )  # fmt: skip
 
 

@@ -21,46 +21,56 @@ def _stack(point: np.ndarray, dx=0.0, dy=0.0, dz=0.0) -> np.ndarray:
 
 
 def face_length(p: np.ndarray) -> np.ndarray:
+    """A longer lower face: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dy=-4.0 * smoothstep(5.0, -80.0, p[:, 1]) * _front(p))
 
 
 def jaw_width(p: np.ndarray) -> np.ndarray:
+    """A wider jaw: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     low = smoothstep(0.0, -55.0, p[:, 1]) * (1 - smoothstep(-85.0, -115.0, p[:, 1]))
     return _stack(p, dx=0.065 * p[:, 0] * low)
 
 
 def mouth_width(p: np.ndarray) -> np.ndarray:
+    """A wider mouth: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dx=0.085 * p[:, 0] * bump(p[:, 0], p[:, 1], 0, -39, 30, 18) * _front(p))
 
 
 def nose_length(p: np.ndarray) -> np.ndarray:
+    """A longer nose: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     tip = bump(p[:, 0], p[:, 1], 0, -9, 14, 8) * _front(p)
     return _stack(p, dy=-1.8 * tip, dz=1.4 * tip)
 
 
 def nose_width(p: np.ndarray) -> np.ndarray:
+    """A wider nose: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dx=0.15 * p[:, 0] * bump(p[:, 0], p[:, 1], 0, -9, 17, 11) * _front(p))
 
 
 def nose_bridge(p: np.ndarray) -> np.ndarray:
+    """A higher bridge of the nose: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dz=2.0 * bump(p[:, 0], p[:, 1], 0, 14, 8, 14) * _front(p))
 
 
 def chin(p: np.ndarray) -> np.ndarray:
+    """A more prominent chin: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dz=2.6 * bump(p[:, 0], p[:, 1], 0, -74, 20, 12) * _front(p))
 
 
 def cheeks(p: np.ndarray) -> np.ndarray:
+    """Fuller cheeks: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     full = bump(np.abs(p[:, 0]), p[:, 1], 46, -24, 15, 20) * _front(p)
     return _stack(p, dx=1.8 * np.sign(p[:, 0]) * full, dz=2.2 * full)
 
 
 def eye_spacing(p: np.ndarray) -> np.ndarray:
+    """Eyes further apart: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     band = np.exp(-0.5 * ((p[:, 1] - 28.0) / 22.0) ** 2) * _front(p)
     return _stack(p, dx=1.5 * np.tanh(p[:, 0] / 18.0) * band)
 
 
 def brow(p: np.ndarray) -> np.ndarray:
+    """A stronger brow ridge: points `p` (N, 3) mm -> displacements (N, 3) mm."""
     return _stack(p, dz=1.5 * bump(np.abs(p[:, 0]), p[:, 1], 22, 48, 20, 8) * _front(p))
 
 
@@ -102,7 +112,7 @@ def identities(f: Fields, count: int) -> np.ndarray:
 
 
 def rigid_identities(centre_mm: np.ndarray, count: int) -> np.ndarray:
-    """Shifts (I, 3) mm of a rigid part (eyeball, teeth) that lies at `centre_mm`."""
+    """Shifts (I, 3) mm of a rigid part (eyeball, teeth) that lies at `centre_mm` (3,)."""
     at = np.asarray(centre_mm, dtype=float)[None]
     zero = np.zeros(3)
     return np.array(
@@ -111,7 +121,7 @@ def rigid_identities(centre_mm: np.ndarray, count: int) -> np.ndarray:
 
 
 def asymmetry(point: np.ndarray, seed: int, amplitude_mm: float = 0.5) -> np.ndarray:
-    """A smooth random unevenness (V, 3) mm, as every person has."""
+    """A smooth random asymmetry (V, 3) mm of points `point` (V, 3) mm, as every face has."""
     rng = np.random.default_rng(seed)
     result = np.zeros_like(point)
     for _ in range(8):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
 from vermilion.faces.procedural_anchors import snap
-from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_scale_mm, locate
+from vermilion.faces.procedural_head import EYE_CENTRE_MM, chart_at, chart_scale_mm
 from vermilion.faces.procedural_mouth import LIP_LOOP, border_chart
 
 
@@ -48,6 +48,7 @@ class Layout:
         return 4 * round(LIP_LOOP.length_mm / self.spacing_mm / 4)
 
     def border_theta(self) -> np.ndarray:
+        """Loop parameters of the border's vertices, (n_border,)."""
         return np.arange(self.n_border) * (2 * np.pi / self.n_border)
 
     def spacing_at(self, distance_mm: float) -> float:
@@ -59,7 +60,10 @@ class Layout:
 
 
 def ring_chart(theta: np.ndarray, border: np.ndarray, radius: float) -> np.ndarray:
-    """Chart ring round the mouth: the border at radius 0, the chart's rim at radius 1."""
+    """Chart ring (N,) complex round the mouth: the border at radius 0, the chart's rim at radius 1.
+
+    `theta` (N,) loop parameters; `border` (N,) complex chart points of the border there.
+    """
     reach = 0.10
     fade = (1.0 - np.exp(-radius / reach)) / (1.0 - np.exp(-1.0 / reach))
     # Near the pointed corners of the mouth the way out is across the border, not along it.
@@ -69,7 +73,10 @@ def ring_chart(theta: np.ndarray, border: np.ndarray, radius: float) -> np.ndarr
 
 
 def skin_rings(layout: Layout) -> list[np.ndarray]:
-    """Chart rings of the skin from the border outwards; the first `n_strips` + 1 are aligned."""
+    """Chart rings of the skin from the border outwards, each (n,) complex.
+
+    The first `n_strips` + 1 have the same number of points, aligned by theta.
+    """
     scale = chart_scale_mm()
     dense = np.linspace(0, 2 * np.pi, 1441)
     dense_border = border_chart(dense[:-1])
@@ -95,7 +102,10 @@ def skin_rings(layout: Layout) -> list[np.ndarray]:
 
 
 def lid_margin_xy(phase: np.ndarray) -> np.ndarray:
-    """The opening of the subject's left eye, frontal (N, 2) mm: phase 0 at the outer corner."""
+    """The opening of the subject's left eye, frontal (N, 2) mm.
+
+    `phase` (N,) in radians, 0 at the outer corner.
+    """
     t = np.cos(phase)
     centre_x, half = EYE_CENTRE_MM[0] + 0.3, 13.6
     lift = 1.0 - np.abs(t) ** 2.2
@@ -106,18 +116,18 @@ def lid_margin_xy(phase: np.ndarray) -> np.ndarray:
 
 
 def eye_rings(layout: Layout) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Phase of the lid margin's vertices, and chart rings round the left eye, margin first."""
+    """Phase (n,) of the lid margin's vertices, and chart rings (n,) complex round the left eye."""
     spacing = 1.35 * layout.spacing_mm * (1.0 + 0.35 * (layout.coarsening - 1.0))
     count = 2 * round(68.0 / spacing / 2)
     phase = np.arange(count) * (2 * np.pi / count)
     centre = EYE_CENTRE_MM[:2] + np.array([0.3, 0.6])
-    rings, distance = [locate(lid_margin_xy(phase))], 0.0
+    rings, distance = [chart_at(lid_margin_xy(phase))], 0.0
     while distance < 15.5:
         distance += 0.9 * spacing * (1.0 + 0.07 * distance)
         circle = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
         share = 1.0 - np.exp(-distance / 22.0)
         xy = lid_margin_xy(phase) * (1 - share) + centre * share + distance * circle
-        rings.append(locate(xy))
+        rings.append(chart_at(xy))
     return phase, rings
 
 
@@ -161,7 +171,7 @@ def skin_sheet(layout: Layout) -> SkinSheet:
     aligned = np.arange(len(strips)).reshape(-1, n)
     around = _triangulate(chart, layout.n_strips * n, [aligned[-1], *eyes])
     triangles = np.concatenate([strip_triangles(list(aligned[::-1])), around])
-    return SkinSheet(chart, triangles.astype(np.int32), tuple(eyes), phase, anchors)
+    return SkinSheet(chart, triangles.astype(np.int32), (eyes[0], eyes[1]), phase, anchors)
 
 
 def _loose_points(
@@ -229,9 +239,10 @@ def _within(points: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.n
 
 
 def strip_triangles(rings: list[np.ndarray]) -> np.ndarray:
-    """Quads between closed rings of equal length, split; outward when rings go into a hole.
+    """Quads between closed rings of equal length, split into triangles (T, 3).
 
-    Each ring runs counter-clockwise seen from outside, and the next lies within it.
+    `rings` are vertex ids, (n,) each. They run counter-clockwise seen from outside, and each lies
+    within the one before; triangles face outwards when rings go into a hole.
     """
     parts = []
     for k, (outer, inner) in enumerate(pairwise(rings)):
@@ -244,5 +255,5 @@ def strip_triangles(rings: list[np.ndarray]) -> np.ndarray:
 
 
 def fan_triangles(ring: np.ndarray, centre: int) -> np.ndarray:
-    """Close a ring with triangles to a centre vertex, oriented as `strip_triangles`."""
+    """Triangles (n, 3) from a ring of ids `ring` (n,) to a centre, as `strip_triangles`."""
     return np.stack([ring, np.roll(ring, -1), np.full(len(ring), centre)], -1).astype(np.int32)

@@ -8,10 +8,12 @@ bottom of the socket.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from vermilion.faces.procedural_head import locate, skin_point, smoothstep
+from vermilion.faces.procedural_head import chart_at, skin_point, smoothstep
 
 HALF_WIDTH_MM = 26.0
 STOMION_Y_MM = -39.0
@@ -45,13 +47,16 @@ _UPPER_AT, _LOWER_AT = _even(_UPPER), _even(_LOWER)
 
 
 def lip_line_y(u: np.ndarray) -> np.ndarray:
-    """Height (mm) of the line where the lips meet, along u = x / half width."""
+    """Height (N,) mm of the line where the lips meet; `u` (N,) is x / half width."""
     tubercle = -0.7 * np.exp(-((u / 0.22) ** 2)) + 0.35 * np.exp(-(((np.abs(u) - 0.45) / 0.2) ** 2))
     return STOMION_Y_MM + tubercle - 1.1 * np.abs(u) ** 3
 
 
 def border_height(u: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Distance in y (mm) of the vermilion border from the line where the lips meet."""
+    """Distance in y, (N,) mm, of the vermilion border from the line where the lips meet.
+
+    `u` (N,) is x / half width; `upper` (N,) bool, which lip.
+    """
     return np.where(upper, _UPPER_AT(u), _LOWER_AT(u))
 
 
@@ -76,6 +81,7 @@ class LipLoop:
             self.length_mm += float(length[-1])
 
     def u(self, theta: np.ndarray) -> np.ndarray:
+        """x / half width, (N,), at loop parameters `theta` (N,)."""
         turn = np.mod(theta, 2 * np.pi)
         upper = self._tables[0](np.clip(turn / np.pi, 0, 1))
         lower = self._tables[1](np.clip(2.0 - turn / np.pi, 0, 1))
@@ -86,27 +92,27 @@ LIP_LOOP = LipLoop()
 
 
 def is_upper(theta: np.ndarray) -> np.ndarray:
-    """Whether theta lies on the upper lip (corners included)."""
+    """Whether loop parameters `theta` (N,) lie on the upper lip, corners included, (N,) bool."""
     return np.mod(theta, 2 * np.pi) <= np.pi + 1e-12
 
 
 def taper(u: np.ndarray) -> np.ndarray:
-    """1 at the middle of the mouth, 0 at the corners."""
+    """1 at the middle of the mouth, 0 at the corners, (N,); `u` (N,) is x / half width."""
     return np.clip(1.0 - np.abs(u) ** 2.6, 0.0, 1.0)
 
 
 def border_xy(theta: np.ndarray) -> np.ndarray:
-    """Frontal position (N, 2) mm of the vermilion border."""
+    """Frontal position (N, 2) mm of the vermilion border at loop parameters `theta` (N,)."""
     return _border_xy(LIP_LOOP.u(theta), is_upper(theta))
 
 
 def border_chart(theta: np.ndarray) -> np.ndarray:
-    """Chart position (N,) complex of the vermilion border."""
-    return locate(border_xy(theta))
+    """Chart position (N,) complex of the vermilion border at loop parameters `theta` (N,)."""
+    return chart_at(border_xy(theta))
 
 
 def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Surface of vermilion and inner fold, theta (N,), s (N,) in [0, 2] -> (N, 3) mm."""
+    """Surface of vermilion and inner fold: `theta` (N,), `s` (N,) in [0, 2] -> (N, 3) mm."""
     u, upper = LIP_LOOP.u(theta), is_upper(theta)
     sign = np.where(upper, 1.0, -1.0)
     middle = taper(u)
@@ -117,8 +123,8 @@ def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     height = border_height(u, upper) + 2.5 * behind * (1 - middle)
     gap = 0.5 * REST_GAP_MM * middle * np.clip(s / 0.75, 0.0, 1.0) ** 2
     y = lip_line_y(u) + sign * (share * height + gap)
-    border_z = skin_point(locate(_border_xy(u, upper)))[:, 2]
-    upper_z = skin_point(locate(_border_xy(u, np.ones(len(u), dtype=bool))))[:, 2]
+    border_z = skin_point(chart_at(_border_xy(u, upper)))[:, 2]
+    upper_z = skin_point(chart_at(_border_xy(u, np.ones(len(u), dtype=bool))))[:, 2]
     meeting_z = upper_z + _CORNER_MEETING_MM * (1 - middle)
     leaving = smoothstep(0.0, 1.0, np.clip(s, 0.0, 1.0))
     corner = np.where(s > 1.0, _CORNER_FOLD(np.maximum(s, 1.0)), 0.0)
@@ -126,13 +132,16 @@ def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     return np.stack([u * (HALF_WIDTH_MM - inward), y, z], axis=-1)
 
 
-def _section(table: list[tuple[float, ...]], s: np.ndarray) -> np.ndarray:
+def _section(table: Sequence[tuple[float, ...]], s: np.ndarray) -> np.ndarray:
     rows = np.array(table)
     return CubicSpline(rows[:, 0], rows[:, 1:], bc_type="natural")(s).T
 
 
 def socket_point(theta: np.ndarray, s: np.ndarray, fold_end: np.ndarray) -> np.ndarray:
-    """The dark bag behind the lips, s in [2, 3], joined to `fold_end` (N, 3) at s = 2."""
+    """The surface of the mouth's socket behind the lips, (N, 3) mm.
+
+    `theta` (N,) and `s` (N,) in [2, 3]; it joins `fold_end` (N, 3) at s = 2.
+    """
     depth = s - 2.0
     ball = np.stack(
         [25.0 * np.cos(theta), STOMION_Y_MM + 15.0 * np.sin(theta), np.zeros_like(theta)], axis=-1

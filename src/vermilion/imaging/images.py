@@ -149,7 +149,6 @@ def write_srgb8(path: str | Path, pixels: np.ndarray) -> None:
     height, width, depth = pixels.shape
     spec = oiio.ImageSpec(width, height, depth, oiio.UINT8)
     spec["oiio:ColorSpace"] = "sRGB"
-    # Files are rewritten bit for bit by a rerun, so nothing of the moment goes into them.
     spec["png:compressionLevel"] = 4
     _write(path, spec, pixels)
 
@@ -165,6 +164,8 @@ def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
 
 
 def _write(path: str | Path, spec: oiio.ImageSpec, pixels: np.ndarray) -> None:
+    # A rerun writes the same bytes: no time. Where it is not set, OpenImageIO writes the time of day.
+    spec["DateTime"] = ""
     with atomic_path(path) as temporary:
         stream = oiio.ImageOutput.create(str(temporary))
         if not stream or not stream.open(str(temporary), spec):

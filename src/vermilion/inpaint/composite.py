@@ -25,7 +25,54 @@ class Window:
 
     @property
     def slices(self) -> tuple[slice, slice]:
+        """Rows and columns of the window."""
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
+
+
+@dataclass(frozen=True)
+class WindowRays:
+    """What the rays through a window meet on the mesh: cast once, used by every rendering.
+
+    (H, W) is the window's size times `samples`.
+
+    Attributes:
+        domain: the lips in texture space.
+        window: where.
+        pixels: (H, W, 2) image place of each ray, px.
+        texel: (H, W, 2) place in the texture.
+        on_domain: (H, W) bool, the ray meets the domain.
+        no_skin: (H, W) bool, the ray meets the inside of the mouth or the background.
+    """
+
+    domain: LipDomain
+    window: Window
+    pixels: np.ndarray
+    texel: np.ndarray
+    on_domain: np.ndarray
+    no_skin: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """What of a window is painted; any texture can be rendered through it.
+
+    Attributes:
+        rays: of the window.
+        share: (H, W) opacity of the texture at each ray.
+        blank: (H, W) bool, the mouth is open there.
+        lacking: (H, W) bool, lips in the image where the mesh has none.
+        known: (H, W) bool, rays whose colour is continued to `lacking`.
+        opacity: (h, w) as `Layer.opacity`.
+        open: (h, w) as `Layer.open`.
+    """
+
+    rays: WindowRays
+    share: np.ndarray
+    blank: np.ndarray
+    lacking: np.ndarray
+    known: np.ndarray
+    opacity: np.ndarray
+    open: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -52,7 +99,10 @@ def window_of(
     triangles: np.ndarray,
     margin_px: int,
 ) -> Window | None:
-    """The rectangle that the domain's vertices project into; None where outside the image."""
+    """The rectangle that the domain's vertices project into; None where outside the image.
+
+    `vertices_mm` (V, 3) in the world, `triangles` (T, 3).
+    """
     pixels = camera.project(vertices_mm[np.unique(triangles[domain.in_domain])])
     pixels = pixels[np.isfinite(pixels).all(axis=1)]
     if not len(pixels):
@@ -65,21 +115,10 @@ def window_of(
     return Window(int(low[0]), int(low[1]), *(int(n) for n in high - low))
 
 
-def render_layer(
-    domain: LipDomain,
-    texture: np.ndarray,
-    opacity: np.ndarray,
-    caster: RayCaster,
-    camera: Camera,
-    window: Window,
-    samples: int = 3,
-    opening: Opening | None = None,
-) -> Layer:
-    """Render a texture (h, w, 3) and its opacity (h, w), `samples` squared rays a pixel.
-
-    Where an `opening` is given, it decides what is lip and what is open between the corners of the
-    mouth; where the mesh has no lip, the colour of the lip beside is continued.
-    """
+def cast_window(
+    domain: LipDomain, caster: RayCaster, camera: Camera, window: Window, samples: int
+) -> WindowRays:
+    """Cast the rays of a window, `samples` squared a pixel."""
     size = (window.height * samples, window.width * samples)
     x, y = np.meshgrid(np.arange(size[1]) + 0.5, np.arange(size[0]) + 0.5)
     pixels = np.stack([x, y], axis=-1) / samples + [window.x, window.y]
@@ -88,48 +127,60 @@ def render_layer(
     on_domain = hits.hit & domain.in_domain[triangle]
     corners = caster.triangles[triangle]
     texel = (domain.texel_of_vertex[corners] * hits.barycentric[..., None]).sum(axis=-2)
-    alpha = np.where(on_domain, sample(opacity, texel), 0.0)
-    colour = sample(texture, texel) * alpha[..., None]
-    # The mouth's inside and the background; bare skin outside the domain stays as it is.
-    outside = ~hits.hit | (~on_domain & ~domain.skin[triangle])
-    if opening is not None:
-        inner = outside | (on_domain & (sample(domain.inner.astype(np.float32), texel) > 0.5))
-        alpha, colour, outside = _opened(opening, pixels, inner, outside, alpha, colour)
-    shrink = (window.width, window.height)
-    return Layer(
-        window,
-        cv2.resize(colour.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
-        cv2.resize(alpha.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
-        cv2.resize(outside.astype(np.float32), shrink, interpolation=cv2.INTER_AREA),
-    )
+    # Bare skin outside the domain stays as it is.
+    no_skin = ~hits.hit | (~on_domain & ~domain.skin[triangle])
+    return WindowRays(domain, window, pixels, texel, on_domain, no_skin)
 
 
-def _opened(
-    opening: Opening,
-    pixels: np.ndarray,
-    inner: np.ndarray,
-    outside: np.ndarray,
-    alpha: np.ndarray,
-    colour: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Opacity, colour and what is open, with the opening that the image shows for the mesh's."""
-    open_here, near = opening.inside(pixels), opening.near(pixels)
+def stencil_of(rays: WindowRays, opacity: np.ndarray, opening: Opening | None = None) -> Stencil:
+    """The stencil of a texture's opacity (h, w).
+
+    An `opening` decides what is lip and what is open between the corners of the mouth, whatever the
+    mesh has there.
+    """
+    share = np.where(rays.on_domain, sample(opacity, rays.texel), 0.0)
+    if opening is None:
+        none = np.zeros_like(rays.on_domain)
+        covered, opened = _shrunk(rays, share), _shrunk(rays, rays.no_skin)
+        return Stencil(rays, share, none, none, none, covered, opened)
+    on_inner = sample(rays.domain.inner.astype(np.float32), rays.texel) > 0.5
+    inner = rays.no_skin | (rays.on_domain & on_inner)
+    open_here, near = opening.inside_and_near(rays.pixels)
     lacking = near & inner & ~open_here
-    painted = (alpha > 0.99) & ~inner & ~open_here
-    if lacking.any() and painted.any():
-        colour = np.where(lacking[..., None], fill_holes(colour, painted), colour)
-        alpha = np.where(lacking, 1.0, alpha)
-    alpha = np.where(open_here, 0.0, alpha)
-    colour = np.where(open_here[..., None], 0.0, colour)
-    return alpha, colour, np.where(near & inner, open_here, outside | open_here)
+    known = (share > 0.99) & ~inner & ~open_here
+    lacking = lacking & known.any()
+    alpha = np.where(open_here, 0.0, np.where(lacking, 1.0, share))
+    opened = np.where(near & inner, open_here, rays.no_skin | open_here)
+    covered, opened = _shrunk(rays, alpha), _shrunk(rays, opened)
+    return Stencil(rays, share, open_here, lacking, known, covered, opened)
 
 
-def softened(layer: Layer, sigma_px: float) -> Layer:
-    """The layer seen through a lens: a Gaussian of `sigma_px`."""
+def render_layer(stencil: Stencil, texture: np.ndarray) -> Layer:
+    """A texture (h, w, 3), linear, rendered through a stencil.
+
+    Where the mesh has no lip but the image does, the colour of the lip beside is continued.
+    """
+    colour = sample(texture, stencil.rays.texel) * stencil.share[..., None]
+    if stencil.lacking.any():
+        filled = fill_holes(colour, stencil.known)
+        colour = np.where(stencil.lacking[..., None], filled, colour)
+    colour = np.where(stencil.blank[..., None], 0.0, colour)
+    rgb = _shrunk(stencil.rays, colour)
+    return Layer(stencil.rays.window, rgb, stencil.opacity, stencil.open)
+
+
+def _shrunk(rays: WindowRays, values: np.ndarray) -> np.ndarray:
+    """Values (H, W[, c]) at the rays as means over pixels, (h, w[, c]) float32."""
+    size = (rays.window.width, rays.window.height)
+    return cv2.resize(values.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+
+
+def blur_layer(layer: Layer, sigma_px: float) -> Layer:
+    """The layer as a lens blurs it: a Gaussian of `sigma_px`."""
     if sigma_px <= 0:
         return layer
     edge = int(np.ceil(3 * sigma_px))
-    opened = cv2.copyMakeBorder(layer.open, *[edge] * 4, cv2.BORDER_REPLICATE)
+    opened = cv2.copyMakeBorder(layer.open, edge, edge, edge, edge, cv2.BORDER_REPLICATE)
     return replace(
         layer,
         rgb=blur(layer.rgb, sigma_px),
@@ -139,12 +190,18 @@ def softened(layer: Layer, sigma_px: float) -> Layer:
 
 
 def composite(linear: np.ndarray, layer: Layer, rim_px: float, darkest: float = 0.0) -> np.ndarray:
-    """A copy of an image (h, w, 3), linear, with the layer painted over it.
+    """A copy of an image with a layer painted over it, (h, w, 3) float32.
 
     Pixels without skin (mouth opening, teeth, background) keep their colour, except within `rim_px`
     of the painted lips, where the lens mixed the tattoo into them: there the colour of the pure
     pixels behind is continued. Where the opening is too narrow for pure pixels, those count that are
     darker than the lips ever are (luminance `darkest`).
+
+    Args:
+        linear: (h, w, 3) the image, linear RGB.
+        layer: what is painted.
+        rim_px: how far the lens mixes the lips into what is beside them.
+        darkest: luminance below which no lip is.
     """
     result = np.array(linear, dtype=np.float32)
     patch = result[layer.window.slices]

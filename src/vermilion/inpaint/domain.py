@@ -67,7 +67,8 @@ class LipDomain:
     def distance_mm(self, mask: np.ndarray, limit_mm: float) -> np.ndarray:
         """Distance along the surface to the texels of a mask, (h, w); infinite beyond the limit.
 
-        A chart stretches the corners of the mouth: texels are no measure of length there.
+        `mask` (h, w) bool. Texels do not measure length: a chart stretches the corners of the
+        mouth.
         """
         distance = np.full(self.shape, np.inf, dtype=np.float32)
         sources = self._node[mask & self.valid]
@@ -104,7 +105,7 @@ class LipDomain:
         return self.triangle[self.valid], self.barycentric[self.valid]
 
     def image(self, values: np.ndarray) -> np.ndarray:
-        """Values (n, ...) of the valid texels as an image (h, w, ...), zero elsewhere."""
+        """Values `values` (n, ...) of the valid texels as an image (h, w, ...), zero elsewhere."""
         filled = np.zeros((*self.shape, *values.shape[1:]), dtype=values.dtype)
         filled[self.valid] = values
         return filled
@@ -188,7 +189,7 @@ def _distance_from(model: FaceModel, source: np.ndarray, limit_mm: float) -> np.
 
 
 def _charted(model: FaceModel, candidates: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
-    """Candidates whose chart is sane (no seam, not folded over) and hangs together with the lips."""
+    """Candidates (T,) whose chart has no seam or fold and is connected to the lips, (T,) bool."""
     uv = model.uv.astype(np.float64)
     a, b, c = (uv[model.triangles[:, k]] for k in range(3))
     signed = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]

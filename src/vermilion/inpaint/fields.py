@@ -20,7 +20,10 @@ def sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def blur(values: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian of (h, w[, c]) with zeros outside; `sigma` in texels or pixels."""
+    """Gaussian of an image with zeros outside, (h, w, c) or (h, w).
+
+    `values` (h, w, c) or (h, w); `sigma` in texels or pixels.
+    """
     if sigma <= 0:
         return np.asarray(values, dtype=np.float32)
     return cv2.GaussianBlur(
@@ -31,10 +34,15 @@ def blur(values: np.ndarray, sigma: float) -> np.ndarray:
 def weighted_blur(
     values: np.ndarray, weights: np.ndarray, sigma: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Low-pass of `values` (h, w[, c]) that ignores texels of weight 0 (normalised convolution).
+    """Low-pass that ignores texels of weight 0 (normalised convolution).
+
+    Args:
+        values: (h, w, c) or (h, w).
+        weights: (h, w).
+        sigma: of the Gaussian, in texels or pixels.
 
     Returns:
-        (means (h, w[, c]), support (h, w) in [0, 1]); zero where nothing supports the mean.
+        (means as `values`, support (h, w) in [0, 1]); zero where nothing supports the mean.
     """
     weights = np.asarray(weights, dtype=np.float32)
     expand = (slice(None), slice(None)) + (None,) * (np.ndim(values) - 2)
@@ -44,10 +52,18 @@ def weighted_blur(
 
 
 def fill_holes(values: np.ndarray, known: np.ndarray, sigma: float = 1.5) -> np.ndarray:
-    """Values (h, w[, c]) continued smoothly from where they are `known` (h, w) to everywhere.
+    """Values continued smoothly from where they are known to everywhere.
 
-    Each round widens the Gaussian twofold and fills what it reaches, so that near holes are filled
-    from near by; a few rounds of averaging remove the steps between the rounds.
+    Each round doubles the width of the Gaussian and fills what it reaches, so that small holes are
+    filled from close by. A few rounds of averaging remove the steps between the rounds.
+
+    Args:
+        values: (h, w, c) or (h, w).
+        known: (h, w) bool.
+        sigma: of the first round, in texels or pixels.
+
+    Returns:
+        float32, as `values`; zero where nothing is known.
     """
     if not known.any():
         return np.zeros_like(values, dtype=np.float32)
@@ -68,5 +84,5 @@ def fill_holes(values: np.ndarray, known: np.ndarray, sigma: float = 1.5) -> np.
 
 
 def luminance(linear: np.ndarray) -> np.ndarray:
-    """Luminance of linear RGB (..., 3)."""
+    """Luminance (...,) of linear RGB `linear` (..., 3)."""
     return np.asarray(linear, dtype=np.float32) @ LUMINANCE

@@ -23,7 +23,7 @@ def write_texture(
 def read_texture(
     path: str | Path, domain: LipDomain, **place
 ) -> tuple[Texture, dict[str, np.ndarray]]:
-    """Read what `write_texture` wrote: the texture and the other channels.
+    """Read what `write_texture` wrote: the texture and the other channels, each (h, w).
 
     Raises InputError where it does not belong to the domain.
     """

@@ -13,7 +13,10 @@ _FINE_PX = 1.5  # scales finer than this Gaussian count as grain
 
 
 def fine_deviation(linear: np.ndarray, where: np.ndarray) -> float:
-    """Robust deviation of the fine scales of display luminance over a mask (h, w), in [0, 1]."""
+    """Robust deviation of the fine scales of display luminance over a mask, in [0, 1].
+
+    `linear` (h, w, 3), `where` (h, w) bool.
+    """
     grey = linear_to_srgb(luminance(linear))
     inside = where.astype(np.float32)
     support = np.maximum(blur(inside, _FINE_PX), 1e-3)
@@ -24,7 +27,10 @@ def fine_deviation(linear: np.ndarray, where: np.ndarray) -> float:
 
 
 def missing_grain(image: np.ndarray, rendered: np.ndarray, where: np.ndarray) -> float:
-    """Deviation of the noise that a rendering lacks, from bare skin that both show."""
+    """Deviation of the noise that a rendering lacks, from bare skin that both show.
+
+    `image` (h, w, 3) and `rendered` (h, w, 3) are linear, `where` (h, w) bool.
+    """
     have, want = fine_deviation(rendered, where), fine_deviation(image, where)
     return float(np.sqrt(max(want**2 - have**2, 0.0)))
 
@@ -32,10 +38,16 @@ def missing_grain(image: np.ndarray, rendered: np.ndarray, where: np.ndarray) ->
 def add_grain(
     linear: np.ndarray, opacity: np.ndarray, deviation: float, seed: tuple[int, ...]
 ) -> np.ndarray:
-    """A copy of (h, w, 3) with grey noise of a display deviation where it is painted.
+    """A copy of an image with grey noise where it is painted, (h, w, 3).
 
-    The noise has the spectrum of an image after demosaicing and compression: hardly any at the
-    finest scale.
+    The noise has the spectrum of an image after demosaicing and compression: little at the finest
+    scale.
+
+    Args:
+        linear: (h, w, 3) linear RGB.
+        opacity: (h, w) of what is painted.
+        deviation: of the noise, display values in [0, 1].
+        seed: of the noise.
     """
     if deviation <= 0:
         return linear
@@ -45,6 +57,6 @@ def add_grain(
     return np.where(opacity[..., None] > 0, srgb_to_linear(np.clip(display, 0, 1)), linear)
 
 
-def seed_of(seed: int, subject: str, take: str, frame: int) -> tuple[int, ...]:
+def noise_seed(seed: int, subject: str, take: str, frame: int) -> tuple[int, ...]:
     """Seed of one frame's noise; independent of chunks and order."""
     return seed, zlib.crc32(f"{subject}/{take}".encode()), frame

@@ -9,22 +9,23 @@ import numpy as np
 
 from vermilion.imaging.draw import label, tile, to_display
 from vermilion.inpaint.bake import Texture
-from vermilion.inpaint.paint import Painted
 
 
 def before_after(
-    frame: int, linear: np.ndarray, painted: Painted, height_px: int = 240
+    frame: int, before: np.ndarray, after: np.ndarray, height_px: int = 240
 ) -> np.ndarray:
-    """The window of one frame before and after, one above the other, (h, w, 3) uint8."""
-    pair = [to_display(image[painted.window.slices]) for image in (linear, painted.linear)]
-    scale = height_px / pair[0].shape[0]
-    size = (max(1, round(pair[0].shape[1] * scale)), height_px)
-    pair = [cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) for image in pair]
+    """The window of one frame before and after, one above the other, (h, w, 3) uint8.
+
+    `before` and `after` (h, w, 3) uint8, of the same size.
+    """
+    scale = height_px / before.shape[0]
+    size = (max(1, round(before.shape[1] * scale)), height_px)
+    pair = [cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) for image in (before, after)]
     return np.vstack([label(pair[0], f"{frame}"), pair[1]])
 
 
-def sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
-    """Tiles side by side; a note where there are none."""
+def contact_sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
+    """`tiles` (h, w, 3) uint8 side by side in rows, (H, W, 3); a note where there are none."""
     if not tiles:
         return label(np.full((60, 480, 3), 40, dtype=np.uint8), "no frame could be painted")
     return tile(tiles, columns)
@@ -33,7 +34,7 @@ def sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
 def texture_sheet(
     plain: Texture, tattooed: Texture | None = None, opacity: np.ndarray | None = None
 ) -> np.ndarray:
-    """Textures and the painted region side by side."""
+    """Textures and the painted region, `opacity` (h, w), side by side, (H, W, 3) uint8."""
     tiles = [label(to_display(plain.rgb), "plain")]
     if tattooed is not None:
         tiles.append(label(to_display(tattooed.rgb), "tattooed"))

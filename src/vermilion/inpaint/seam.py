@@ -1,8 +1,8 @@
 """Shading next to where the lips meet: read along the inner contours, sharp across them.
 
-A texture's low-passed change of light cannot hold the dark line between closed lips, nor the shadow that
-one lip casts on the rim of the other. Along the contour the tattoo's pattern averages out over a few
-millimetres, so that there the light is known row by row.
+The low-passed change of light of `shading` is too smooth for the dark line between closed lips, and for
+the shadow of one lip on the rim of the other. Along the contour, the tattoo's pattern averages out over a
+few millimetres; there, each row of pixels at one distance from the contour gives its own light.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from vermilion.inpaint.composite import Layer, Window
 from vermilion.inpaint.fields import luminance, sample
 from vermilion.inpaint.opening import Opening
 
-#: Lips only shade each other: the band never lightens, and never blackens wholly.
+#: Lips only shade each other: the gain never lightens, and never makes a lip fully black.
 _LARGEST, _SMALLEST = 1.0, 0.05
 
 

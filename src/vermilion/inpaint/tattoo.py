@@ -36,17 +36,20 @@ def tattoo_mask(
     coloured = _opened(domain, _closed(domain, coloured, closing_mm), 0.4)
     vermilion = domain.valid & (domain.lip_distance_mm < 0.5 * domain.texel_mm)
     mask = _joined_to(coloured | vermilion, vermilion)
-    # Inside the mouth only what both neutrals show can be judged; the rest continues its border.
+    # Inside the mouth, texels that one of the neutrals does not show continue those beside them.
     hidden = domain.valid & ~known
     continued = fill_holes(mask.astype(np.float32), known | vermilion) > 0.5
     mask = np.where(hidden, continued, mask) & domain.valid
     return _closed(domain, mask, closing_mm)
 
 
-def feathered(
+def feather_mask(
     domain: LipDomain, mask: np.ndarray, border_mm: float, feather_mm: float
 ) -> np.ndarray:
-    """Opacity (h, w) float32: 1 up to `border_mm` outside the mask, then smoothly to 0."""
+    """Opacity (h, w) float32: 1 up to `border_mm` outside a mask, then smoothly to 0.
+
+    `mask` (h, w) bool.
+    """
     outside = domain.distance_mm(mask, border_mm + feather_mm + 1.0)
     t = np.clip((outside - border_mm) / max(feather_mm, 1e-6), 0.0, 1.0)
     return np.where(domain.valid, 1.0 - t * t * (3.0 - 2.0 * t), 0.0).astype(np.float32)

@@ -104,6 +104,6 @@ def _tracked(table1: pd.DataFrame, names: dict[str, str], heading: str) -> pd.Da
             if row in rows.index:
                 found.append({heading: name, "regressor": kind} | rows.loc[row, columns].to_dict())
     table = pd.DataFrame(found, columns=[heading, "regressor", *columns])
-    # A regressor without any variant says nothing of the influence of features.
+    # A regressor without variants shows no influence of features.
     several = table.groupby("regressor")[heading].transform("nunique") > 1
     return table[several].reset_index(drop=True)

@@ -24,11 +24,11 @@ def colour_of(regressor: str) -> str:
     return COLOURS.get(kind_of(regressor).split("/")[0], "#999999")
 
 
-def line_of(regressor: str) -> str:
+def line_style(regressor: str) -> str:
     return "--" if "/" in regressor else "-"
 
 
-def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
+def plot_curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
     """Errors over time as PNG: mouth, vermilion, and the gap between the lips.
 
     Args:
@@ -47,7 +47,7 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
             rows = table[table["regressor"] == regressor]
             axis.plot(
                 *with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
-                line_of(regressor), color=colour_of(regressor), lw=1.4, label=regressor,
+                line_style(regressor), color=colour_of(regressor), lw=1.4, label=regressor,
             )  # fmt: skip
         if column == "aperture_mm":
             rows = table[table["regressor"] == "truth"]
@@ -65,7 +65,7 @@ def curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
     save(figure, out)
 
 
-def bars(table: pd.DataFrame, out: str | Path) -> None:
+def plot_table1(table: pd.DataFrame, out: str | Path) -> None:
     """Table 1 as an image: mean error of each regressor with its interval, a group a take.
 
     Variants are shown of all takes together alone.
@@ -103,7 +103,7 @@ def bars(table: pd.DataFrame, out: str | Path) -> None:
     save(figure, out)
 
 
-def figure16(
+def plot_figure16(
     takes: dict[str, pd.DataFrame], pairs: Sequence[tuple[str, str]], out: str | Path
 ) -> None:
     """Lips16 figure 16 as PNG: two regressors' error over the mouth, and in feature space, over time.

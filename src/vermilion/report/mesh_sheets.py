@@ -37,7 +37,7 @@ class Column:
     colours: np.ndarray
 
 
-def sheet(
+def render_sheet(
     columns: Sequence[Column],
     frames: Sequence[int],
     centres_mm: np.ndarray,
@@ -63,12 +63,12 @@ def sheet(
                 cells.append(images[index] if view == "front" else paper)
             for column in columns:
                 text = f"{column.name}, frame {frame}" if view == "front" else ""
-                cells.append(caption(render(column, index, camera), text))
+                cells.append(caption(render_mesh(column, index, camera), text))
             rows.append(np.hstack(cells))
     return np.vstack(rows)
 
 
-def render(column: Column, index: int, camera: Camera) -> np.ndarray:
+def render_mesh(column: Column, index: int, camera: Camera) -> np.ndarray:
     """One mesh on white paper, (h, w, 3) uint8."""
     paper = np.full((camera.height_px, camera.width_px, 3), 255, np.uint8)
     mesh = np.asarray(column.meshes_mm[index], dtype=float)
@@ -83,7 +83,11 @@ def error_columns(
     triangles: np.ndarray,
     scale_mm: float,
 ) -> list[Column]:
-    """Columns coloured by vertex error (n, V) mm; NaN, not measured, is grey (figures 14 and 15)."""
+    """Columns coloured by vertex error; what was not measured is grey (figures 14 and 15).
+
+    By name: `meshes_mm` (n, V, 3) and `errors_mm` (n, V), NaN where not measured; `triangles`
+    (T, 3).
+    """
     return [
         Column(name, meshes, triangles, _with_grey(colour_map(errors_mm[name], 0.0, scale_mm), errors_mm[name]))
         for name, meshes in meshes_mm.items()
@@ -93,7 +97,10 @@ def error_columns(
 def clay_columns(
     meshes_mm: dict[str, np.ndarray], triangles: np.ndarray, vermilion: np.ndarray
 ) -> list[Column]:
-    """Columns in clay, lips slightly red (figures 10, 12 and 13); `vermilion` (V,) bool."""
+    """Columns in clay, lips slightly red (figures 10, 12 and 13).
+
+    `meshes_mm` by name (n, V, 3); `triangles` (T, 3); `vermilion` (V,) bool.
+    """
     colours = lip_colours(triangles, vermilion)
     return [
         Column(name, meshes, triangles, np.broadcast_to(colours, (len(meshes), *colours.shape)))
@@ -104,7 +111,10 @@ def clay_columns(
 def stretch_columns(
     meshes_mm: dict[str, np.ndarray], neutrals_mm: dict[str, np.ndarray], triangles: np.ndarray
 ) -> list[Column]:
-    """Columns coloured by surface stretch against each one's own neutral (figures 9 and 11)."""
+    """Columns coloured by surface stretch, each against its own neutral (figures 9 and 11).
+
+    By name: `meshes_mm` (n, V, 3) and `neutrals_mm` (V, 3). `triangles` (T, 3).
+    """
     return [
         Column(name, meshes, triangles, _stretch_colours(surface_stretch(meshes, neutrals_mm[name], triangles)))
         for name, meshes in meshes_mm.items()
@@ -114,7 +124,10 @@ def stretch_columns(
 def surface_stretch(
     meshes_mm: np.ndarray, neutral_mm: np.ndarray, triangles: np.ndarray
 ) -> np.ndarray:
-    """Root of the change of area round each vertex, less 1, (n, V); NaN where it is not known."""
+    """Root of the change of area round each vertex, less 1, (n, V); NaN where it is not known.
+
+    `meshes_mm` (n, V, 3), `neutral_mm` (V, 3), `triangles` (T, 3).
+    """
     before = triangle_areas(np.asarray(neutral_mm, dtype=float), triangles)
     after = triangle_areas(np.asarray(meshes_mm, dtype=float), triangles)
     known = np.isfinite(before) & np.isfinite(after)
@@ -153,14 +166,18 @@ def colour_bar(
 
 
 def view_of(centre_mm: np.ndarray, direction: np.ndarray, width_mm: float, size_px: int) -> Camera:
-    """A long lens that looks at `centre_mm` from `direction`, `width_mm` wide there, nearly square."""
+    """A long lens that looks at `centre_mm` (3,) from `direction` (3,), `width_mm` wide there.
+
+    The view is nearly orthographic.
+    """
     far = 1500.0
-    pose = look_at(centre_mm + far * direction / np.linalg.norm(direction), centre_mm, (0, 1, 0))
+    eye_mm = centre_mm + far * direction / np.linalg.norm(direction)
+    pose = look_at(eye_mm, centre_mm, np.array([0.0, 1.0, 0.0]))
     return pinhole("view", far * size_px / width_mm, size_px, size_px, pose)
 
 
 def caption(image: np.ndarray, text: str) -> np.ndarray:
-    """Dark text on the white paper of (h, w, 3) uint8."""
+    """`image` (h, w, 3) uint8 with dark text at its top."""
     if text:
         image = np.ascontiguousarray(image)
         cv2.putText(
@@ -170,7 +187,10 @@ def caption(image: np.ndarray, text: str) -> np.ndarray:
 
 
 def crop(image: np.ndarray, centre_px: np.ndarray, width_px: float, size_px: int) -> np.ndarray:
-    """The square of an image (h, w, 3) uint8 round a pixel, (size_px, size_px, 3); white outside."""
+    """The square of an image round a pixel, (size_px, size_px, 3) uint8; white outside.
+
+    `image` (h, w, 3) uint8, `centre_px` (2,).
+    """
     scale = size_px / width_px
     matrix = np.array(
         [
@@ -187,7 +207,10 @@ def crop(image: np.ndarray, centre_px: np.ndarray, width_px: float, size_px: int
 def labels_nearby(
     labels: np.ndarray, points_mm: np.ndarray, to_points_mm: np.ndarray, reach_mm: float = 3.0
 ) -> np.ndarray:
-    """(M,) bool: points (M, 3) whose nearest of `points_mm` (N, 3) has a label (N,) and is in reach."""
+    """Points whose nearest labelled point has the label and is in reach, (M,) bool.
+
+    `labels` (N,) bool of `points_mm` (N, 3); `to_points_mm` (M, 3).
+    """
     known = np.flatnonzero(np.isfinite(points_mm).all(axis=1))
     distance, nearest = cKDTree(points_mm[known]).query(to_points_mm)
     return labels[known[nearest]] & (distance < reach_mm)

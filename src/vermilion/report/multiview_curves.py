@@ -31,8 +31,8 @@ PANELS = {
 }
 
 
-def curves(frames: pd.DataFrame, neutral: int) -> Figure:
-    """A panel a figure of the take; `frames` as in `report.Findings`."""
+def curves_figure(frames: pd.DataFrame, neutral: int) -> Figure:
+    """A panel a figure of the take; `frames` as in `multiview_page.TakeFindings`."""
     panels = {
         label: [(column, name) for column, name in lines if column in frames]
         for label, lines in PANELS.items()

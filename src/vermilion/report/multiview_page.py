@@ -12,7 +12,7 @@ import pandas as pd
 from vermilion.imaging.plot import png
 from vermilion.multiview.drift import ALL
 from vermilion.report import page
-from vermilion.report.multiview_curves import curves
+from vermilion.report.multiview_curves import curves_figure
 
 #: Columns that choose frames, with the words for why.
 WORST = {
@@ -23,7 +23,7 @@ WORST = {
 
 
 @dataclass(frozen=True)
-class Findings:
+class TakeFindings:
     """What is known of a take.
 
     Attributes:
@@ -45,7 +45,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class FrameSheet:
     """A frame's images (h, w, 3) uint8 and why it is shown."""
 
     frame: int
@@ -56,7 +56,7 @@ class Sheet:
 def join_frames(
     quality: pd.DataFrame, drift: pd.DataFrame, similarity: np.ndarray, anchors: np.ndarray
 ) -> pd.DataFrame:
-    """One row a frame, for `Findings.frames`; similarity, anchors (F,) in the order of `quality`."""
+    """One row a frame, for `TakeFindings.frames`; similarity, anchors (F,) in the order of `quality`."""
     together = drift[drift["camera"] == ALL].drop(columns=["subject", "take", "camera", "reason"])
     together = together.rename(columns={"measured_percent": "measured_percent_drift"})
     table = quality.merge(together, on="frame", how="left", validate="one_to_one")
@@ -95,12 +95,12 @@ def choose_frames(frames: pd.DataFrame, neutral: int, spaced: int, flagged: int)
     return {number: ", ".join(why[number]) for number in sorted(why)}
 
 
-def report_page(found: Findings, sheets: Sequence[Sheet], page_mb: float) -> str:
+def report_page(found: TakeFindings, sheets: Sequence[FrameSheet], page_mb: float) -> str:
     """The page as one string of HTML with everything embedded."""
     lead = "Multi-view reconstruction: how well each frame is known, and where to look."
     body = ""
     if len(found.frames):
-        body = page.embedded(png(curves(found.frames, found.neutral)), "png", _CURVES)
+        body = page.embedded(png(curves_figure(found.frames, found.neutral)), "png", _CURVES)
     return page.page(
         f"{found.name}: reconstruction",
         lead,
@@ -116,7 +116,7 @@ def report_page(found: Findings, sheets: Sequence[Sheet], page_mb: float) -> str
     )
 
 
-def _key_figures(found: Findings) -> list[tuple[str, str]]:
+def _key_figures(found: TakeFindings) -> list[tuple[str, str]]:
     frames, missing = found.frames, _missing_rows(found)
     items = [(str(max(len(frames), 1)), "frames"), (str(len(found.cameras)), "cameras")]
     items.append((str(len(missing)), "missing images"))
@@ -130,13 +130,19 @@ def _key_figures(found: Findings) -> list[tuple[str, str]]:
         (str(int(frames["anchor"].sum())), f"anchors: {anchors}"),
         (str(len(bad)), "flagged frames"),
         (_figure(frames["residual_px"].median(), "px"), "median residual"),
-        (_figure(_moving(found, "drift_mm_vermilion").median(), "mm"), "median drift, vermilion"),
-        (_figure(_moving(found, "drift_mm_vermilion").max(), "mm"), "drift of the worst frame"),
+        (
+            _figure(_without_neutral(found, "drift_mm_vermilion").median(), "mm"),
+            "median drift, vermilion",
+        ),
+        (
+            _figure(_without_neutral(found, "drift_mm_vermilion").max(), "mm"),
+            "drift of the worst frame",
+        ),
     ]
     return items
 
 
-def _moving(found: Findings, column: str) -> pd.Series:
+def _without_neutral(found: TakeFindings, column: str) -> pd.Series:
     """A column without the neutral, which has no drift against itself."""
     return found.frames[column][found.frames["frame"] != found.neutral]
 
@@ -154,7 +160,7 @@ def _flagged(frames: pd.DataFrame) -> str:
     return note + page.table(rows, {"which": "frames", "count": "count", "reason": "reason"})
 
 
-def _missing(found: Findings) -> str:
+def _missing(found: TakeFindings) -> str:
     rows = _missing_rows(found)
     if rows.empty:
         return '<p class="none">None: every camera has every frame that could be read.</p>'
@@ -164,7 +170,7 @@ def _missing(found: Findings) -> str:
     return page.table(table.assign(reason=table["camera"].map(first)), names)
 
 
-def _missing_rows(found: Findings) -> pd.DataFrame:
+def _missing_rows(found: TakeFindings) -> pd.DataFrame:
     rows = found.drift if len(found.frames) else found.across
     reasons = rows["reason"].fillna("")
     return rows[(rows["camera"] != ALL) & (reasons != "")]
@@ -187,13 +193,13 @@ _CAMERA_COLUMNS = {
 }  # fmt: skip
 
 
-def _cameras(found: Findings) -> str:
+def _cameras(found: TakeFindings) -> str:
     body = ""
     if len(found.frames) > 1:
-        moving = found.drift[found.drift["frame"] != found.neutral]
+        rest = found.drift[found.drift["frame"] != found.neutral]
         body = (
             "<p>Drift of each camera, median over the frames. A camera that stands out is out of "
-            "calibration, out of focus or out of step.</p>" + _camera_table(moving)
+            "calibration, out of focus or out of step.</p>" + _camera_table(rest)
         )
     body += (
         "<p>The neutral: each camera's image carried to its neighbour through the mesh. What is "
@@ -207,7 +213,7 @@ def _camera_table(rows: pd.DataFrame) -> str:
     return page.table(rows.groupby("camera")[columns].median().reset_index(), _CAMERA_COLUMNS)
 
 
-def _sheets(sheets: Sequence[Sheet], page_mb: float, used: int) -> str:
+def _sheets(sheets: Sequence[FrameSheet], page_mb: float, used: int) -> str:
     """The sheets as JPEG, made smaller together until the page keeps to its size."""
     room = max(page_mb * 1e6 - used, 1e5) * 3 / 4  # of which base64 makes the page
     scale, files = 1.0, [page.jpeg(sheet.image, 82) for sheet in sheets]

@@ -39,7 +39,7 @@ class SheetSettings:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownFrame:
     """A frame to draw.
 
     Attributes:
@@ -71,7 +71,7 @@ def columns(settings: SheetSettings, carried_from: str) -> list[str]:
 
 
 def frame_sheet(
-    shown: Shown, model: FaceModel, settings: SheetSettings, carried_from: str = "neutral"
+    shown: ShownFrame, model: FaceModel, settings: SheetSettings, carried_from: str = "neutral"
 ) -> np.ndarray:
     """A row a camera, with those that miss the frame, under a line of headings: (h, w, 3) uint8."""
     mesh = _Mesh.of(shown, model)
@@ -100,7 +100,7 @@ class _Mesh:
     heights_mm: np.ndarray
 
     @classmethod
-    def of(cls, shown: Shown, model: FaceModel) -> _Mesh:
+    def of(cls, shown: ShownFrame, model: FaceModel) -> _Mesh:
         vertices = np.asarray(shown.vertices_mm, dtype=np.float64)
         normals = vertex_normals(vertices, model.triangles)
         heights = np.zeros(0)
@@ -111,7 +111,7 @@ class _Mesh:
         return cls(model, vertices, RayCaster(vertices, model.triangles), normals, heights)
 
 
-def _row(mesh: _Mesh, shown: Shown, name: str, settings: SheetSettings) -> list[np.ndarray]:
+def _row(mesh: _Mesh, shown: ShownFrame, name: str, settings: SheetSettings) -> list[np.ndarray]:
     view, carried = shown.frame.views[name], shown.carried.get(name)
     camera, image = _window(view, carried, settings)
     hits = mesh.caster.see(camera)
@@ -193,10 +193,11 @@ def _points_over(
     at = row * camera.width_px + column
     count = np.bincount(at, minlength=size).reshape(camera.height_px, camera.width_px)
     total = np.bincount(at, mesh.heights_mm[seen], size).reshape(count.shape)
-    count, total = (cv2.blur(part.astype(float), (2, 2)) for part in (count, total))  # larger dots
-    height = total / np.maximum(count, 1e-9)
+    # Larger dots.
+    points, height = (cv2.blur(part.astype(float), (2, 2)) for part in (count, total))
+    height = height / np.maximum(points, 1e-9)
     colours = 255 * colour_map(height, -scale_mm, scale_mm, "coolwarm")
-    return np.where(count[..., None] > 1e-9, np.rint(colours), image).astype(np.uint8)
+    return np.where(points[..., None] > 1e-9, np.rint(colours), image).astype(np.uint8)
 
 
 def _residual(mesh: _Mesh, carried: Carried | None, settings: SheetSettings) -> np.ndarray:

@@ -21,8 +21,8 @@ from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, RefineSettings, frame_cloud
 from vermilion.multiview.views import Frame
-from vermilion.report.multiview_page import Sheet
-from vermilion.report.multiview_sheets import SheetSettings, Shown, frame_sheet
+from vermilion.report.multiview_page import FrameSheet
+from vermilion.report.multiview_sheets import SheetSettings, ShownFrame, frame_sheet
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,11 @@ class TakeSheets:
 
     def draw(
         self, number: int, why: str, mesh_mm: np.ndarray | None, seeing: np.ndarray | None
-    ) -> Sheet:
-        """A frame's sheet from its mesh (V, 3) and the cameras that measured each vertex (V,).
+    ) -> FrameSheet:
+        """A frame's sheet from its mesh and from how many cameras measured each vertex.
 
-        The neutral needs neither. Raises InputError where the frame cannot be read.
+        `mesh_mm` (V, 3) and `seeing` (V,); the neutral needs neither. Raises InputError where the
+        frame cannot be read.
         """
         if number == self.neutral_frame:
             vertices, carried, frame = self.neutral_mm, self._across, self._neutral
@@ -82,5 +83,5 @@ class TakeSheets:
             small = self.images.at(frame, self.drift.scale)
             carried = carry(self._origin, small, vertices, self.matcher, self.drift)
         cloud = frame_cloud(self.images, frame, vertices, self.model, self.stereo, self.refine)
-        shown = Shown(frame, vertices, np.asarray(seeing), cloud, carried)
-        return Sheet(number, why, frame_sheet(shown, self.model, self.sheet, source))
+        shown = ShownFrame(frame, vertices, np.asarray(seeing), cloud, carried)
+        return FrameSheet(number, why, frame_sheet(shown, self.model, self.sheet, source))

@@ -12,6 +12,8 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from vermilion.storage.errors import InputError
+
 _LARGE_BYTES = 300_000
 _STYLE = """
 :root { --ink: #23211f; --soft: #6d6761; --line: #e4dfd9; --accent: #a63d2f; --paper: #fffdfb; }
@@ -123,6 +125,10 @@ def image(path: str | Path, caption: str, width_px: int = 1400) -> str:
     if len(content) <= _LARGE_BYTES:
         return embedded(content, "png", caption)
     pixels = cv2.imread(str(path))
+    if pixels is None:
+        raise InputError(
+            "a file that is no readable image", "PNG or JPEG", "Remove it and run again.", path=path
+        )
     if pixels.shape[1] > width_px:
         height = round(pixels.shape[0] * width_px / pixels.shape[1])
         pixels = cv2.resize(pixels, (width_px, height), interpolation=cv2.INTER_AREA)
@@ -130,7 +136,7 @@ def image(path: str | Path, caption: str, width_px: int = 1400) -> str:
 
 
 def jpeg(pixels: np.ndarray, quality: int) -> bytes:
-    """(h, w, 3) uint8 RGB as a JPEG file of a quality of 0 to 100."""
+    """`pixels` (h, w, 3) uint8 RGB as a JPEG file of a quality of 0 to 100."""
     pixels = np.ascontiguousarray(pixels[..., ::-1])
     return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 

@@ -1,4 +1,4 @@
-"""What the comparisons say, in sentences: nothing in them is written beforehand but the grammar."""
+"""What the comparisons say, in sentences that are composed from their figures."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def statements(
     for question, rows in comparisons.groupby("question", sort=False):
         tracking = rows[rows["measure"] == _TRACKING]
         sentences = [
-            sentence(row) + of_motion(row, rows[rows["measure"] == _MOVING])
+            sentence(row) + motion_sentence(row, rows[rows["measure"] == _MOVING])
             for row in tracking.to_dict("records")
         ]
         sentences += [
             reason
             for row in tracking.to_dict("records")
             if row["answer"] != "better"
-            and (reason := why(row, comparisons, estimators, table1, configured))
+            and (reason := explanation(row, comparisons, estimators, table1, configured))
         ]
         found.append((str(question), sentences))
     return found
@@ -56,8 +56,8 @@ def sentence(row: dict) -> str:
     return f"{figures} ({interval}): {verdict}."
 
 
-def of_motion(row: dict, moving: pd.DataFrame) -> str:
-    """The same comparison without what is wrong about the person in all frames alike; may be empty."""
+def motion_sentence(row: dict, moving: pd.DataFrame) -> str:
+    """The same comparison of the motion error, without the static part; may be empty."""
     same = moving[(moving["first"] == row["first"]) & (moving["second"] == row["second"])]
     if same.empty:
         return ""
@@ -69,18 +69,18 @@ def of_motion(row: dict, moving: pd.DataFrame) -> str:
     )
 
 
-def why(
+def explanation(
     row: dict,
     comparisons: pd.DataFrame,
     estimators: pd.DataFrame,
     table1: pd.DataFrame,
     configured: str,
 ) -> str:
-    """What the other figures say of a difference in tracking that is not an advantage; may be empty.
+    """Why a regressor has no advantage in tracking, by the other figures; may be empty.
 
-    The layers may not differ either (features and layers are bound nearly linearly, as blend shapes
-    are); they may differ while what the integration and the rigid alignment leave hides it; or the
-    training may favour what the held-out frames do not.
+    Three reasons are possible. The layers do not differ either, because features and layers depend on
+    each other nearly linearly, as blend shapes do. Or the layers differ, but the errors of integration
+    and rigid alignment hide it. Or cross-validation prefers one side and the held-out frames do not.
     """
     kind = row["first"].split("/")[0]
     parts = []
@@ -103,7 +103,7 @@ def why(
         change = 100 * (1 - pair[names[0]] / pair[names[1]])
         parts.append(
             f"in cross-validation {abs(change):.0f} % {'less' if change >= 0 else 'more'}"
-            + (", so that a linear map explains nearly all that can be told from these features"
+            + (", so that a linear map explains nearly all that these features can predict"
                if "affine" in names and abs(change) < 5 else "")
         )  # fmt: skip
     floor = table1[

@@ -9,14 +9,14 @@ from pathlib import Path
 import pandas as pd
 
 from vermilion.config.regressors import in_order, is_variant
-from vermilion.report import page, study
+from vermilion.report import lips16_sections, page
 from vermilion.report.how_measured import how_measured
 from vermilion.report.table1 import place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
-REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "judged_on")
+REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "measured_on")
 _STAGES = (
-    "capture", "multiview", "inpaint", "landmarks", "scan", "tracking", "refinement", "detail",
+    "capture", "multiview", "inpaint", "landmarks", "scan", "tracking", "detail",
     "contours", "features", "correspondence", "correction",
 )  # fmt: skip
 
@@ -31,7 +31,7 @@ class Overlay:
 
 
 @dataclass(frozen=True)
-class Findings:
+class SummaryInputs:
     """What the page shows.
 
     Attributes:
@@ -71,7 +71,7 @@ class Findings:
     settings: Sequence[tuple[str, str]]
 
 
-def summary_page(found: Findings, embed_video_mb: float) -> str:
+def summary_page(found: SummaryInputs, embed_video_mb: float) -> str:
     """The page as one string of HTML with everything embedded."""
     takes = len(found.frames)
     total = int(found.frames["frames"].sum()) if takes else 0
@@ -80,18 +80,18 @@ def summary_page(found: Findings, embed_video_mb: float) -> str:
         f"{takes} takes, {total} frames. Everything on this page is also a TSV file beside it.",
         [
             ("Key figures", _key_figures(found)),
-            ("What the comparisons say", study.answers(
+            ("What the comparisons say", lips16_sections.comparison_section(
                 found.comparisons, found.estimators, found.table1, found.configured)),
             ("Table 1: tracking error", _table1(found)),
-            ("Tables 2 and 3: influence of the features", study.features(found.table2, found.table3)),
-            ("RBF network, affine map, kernel regression", study.strategies(found.estimators)
+            ("Tables 2 and 3: influence of the features", lips16_sections.feature_section(found.table2, found.table3)),
+            ("RBF network, affine map, kernel regression", lips16_sections.estimator_section(found.estimators)
              + page.image(found.figure16, _FIGURE16_CAPTION)),
             ("Corrected takes", _videos(found, embed_video_mb)),
             ("Renders", _images(found.renders, _RENDER_CAPTION)),
             ("Surface stretch", _images(found.stretch, _STRETCH_CAPTION)),
             ("Error maps", _images(found.error_maps, _MAP_CAPTION)),
             ("Over time", _images(found.over_time, "{}: held-out frames.")),
-            ("Kinds of mouth shapes", study.kinds(found.kinds)),
+            ("Kinds of mouth shapes", lips16_sections.kinds_section(found.kinds)),
             ("Further measures", _further(found.measures)),
             ("Accuracy of H", _reconstruction(found)),
             ("Training", _images(found.curve_images, "{}: cross-validation error.")),
@@ -124,7 +124,7 @@ _MAP_CAPTION = (
 )
 
 
-def _key_figures(found: Findings) -> str:
+def _key_figures(found: SummaryInputs) -> str:
     items = []
     rows = _together(found.table1).set_index("regressor")
     for name in in_order(name for name in rows.index if not is_variant(name)):
@@ -141,7 +141,7 @@ def _key_figures(found: Findings) -> str:
     return page.figures(items)
 
 
-def _table1(found: Findings) -> str:
+def _table1(found: SummaryInputs) -> str:
     if found.table1.empty:
         return '<p class="none">No take has held-out frames.</p>'
     rows = found.table1.copy()
@@ -191,7 +191,7 @@ def _images(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
     return "".join(page.image(path, caption.format(name)) for name, path in pairs)
 
 
-def _reconstruction(found: Findings) -> str:
+def _reconstruction(found: SummaryInputs) -> str:
     links = ", ".join(
         f'<a href="{page.text(link)}">{page.text(name)}</a>' for name, link in found.reconstructions
     )
@@ -210,7 +210,7 @@ def _reconstruction(found: Findings) -> str:
     )
 
 
-def _videos(found: Findings, limit_mb: float) -> str:
+def _videos(found: SummaryInputs, limit_mb: float) -> str:
     caption = "{}: original, base track, corrected; below, the mouth."
     videos = "".join(
         page.video(path, caption.format(name), limit_mb) for name, path in found.videos
@@ -220,7 +220,7 @@ def _videos(found: Findings, limit_mb: float) -> str:
     )
 
 
-def _flagged(found: Findings) -> str:
+def _flagged(found: SummaryInputs) -> str:
     if found.flagged.empty:
         return '<p class="none">None.</p>'
     rows = found.flagged.assign(where=found.flagged["subject"] + "/" + found.flagged["take"])

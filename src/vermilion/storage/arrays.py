@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from vermilion.storage.errors import InputError, VermilionError
+from vermilion.storage.errors import InputError, PlacedError
 from vermilion.storage.files import atomic_path
 
 
@@ -22,7 +22,7 @@ def read_arrays(
     path: str | Path,
     what: str,
     names: Iterable[str] | None = None,
-    error: type[VermilionError] = InputError,
+    error: type[PlacedError] = InputError,
     **place,
 ) -> dict[str, np.ndarray]:
     """Read the arrays of a file: those named, or all.

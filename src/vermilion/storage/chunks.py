@@ -9,7 +9,7 @@ import numpy as np
 
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
-from vermilion.storage.sequences import locate, read_sequence
+from vermilion.storage.sequences import read_sequence, rows_of_frames
 
 
 def read_frames(paths: Sequence[str | Path], frames: Sequence[int]) -> np.ndarray:
@@ -40,7 +40,7 @@ def read_chunks(
 
 def _places(paths: Sequence[str | Path], frames: Sequence[int]) -> list[tuple[str | Path, int]]:
     """File and row of each frame; raises InputError where a frame is in no file."""
-    found = locate(paths, frames)
+    found = rows_of_frames(paths, frames)
     missing = [int(frame) for frame in frames if int(frame) not in found]
     if missing:
         raise InputError(

@@ -41,16 +41,16 @@ def describe_problem(
     return f"{prefix}found {found}; expected {expected}. {hint}"
 
 
-class InputError(VermilionError):
-    """A file or value that the user gave cannot be used.
-
-    Attributes:
-        brief: what was found, without place and remedy.
-    """
+class PlacedError(VermilionError):
+    """An error that names its place: what was found there, what was expected, what to do."""
 
     def __init__(self, found: str, expected: str, hint: str, **place):
         self.brief = found
         super().__init__(describe_problem(found, expected, hint, **place))
+
+
+class InputError(PlacedError):
+    """A file or value that the user gave cannot be used."""
 
 
 class RefusedInputError(InputError):
@@ -66,8 +66,5 @@ class ConfigurationError(VermilionError):
         super().__init__(f"{len(self.problems)} problem(s) in the configuration:\n{lines}")
 
 
-class ModelFileError(VermilionError):
+class ModelFileError(PlacedError):
     """A model file is damaged, too new, or made for another topology."""
-
-    def __init__(self, found: str, expected: str, hint: str, **place):
-        super().__init__(describe_problem(found, expected, hint, **place))

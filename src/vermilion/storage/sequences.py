@@ -14,7 +14,7 @@ from vermilion.storage.files import atomic_path
 
 
 def write_sequence(path: str | Path, vertices_mm: np.ndarray) -> None:
-    """Write (F, V, 3) as float32 `.npy`."""
+    """Write `vertices_mm` (F, V, 3) as float32 `.npy`."""
     if vertices_mm.ndim != 3 or vertices_mm.shape[2] != 3:
         raise ValueError(f"a sequence must be (F, V, 3), got {vertices_mm.shape}")
     with atomic_path(path) as temporary, open(temporary, "wb") as stream:
@@ -49,12 +49,14 @@ def _open_sequence(path: str | Path) -> np.ndarray:
 
 
 def frames_of(paths: Sequence[str | Path]) -> np.ndarray:
-    """Frame numbers of chunk files `<first>-<last>.<suffix>` in their order."""
+    """Frame numbers (F,) of chunk files `<first>-<last>.<suffix>` in their order."""
     spans = [[int(number) for number in Path(path).stem.split("-")] for path in paths]
     return np.concatenate([np.arange(first, last + 1) for first, last in spans])
 
 
-def locate(paths: Sequence[str | Path], frames: Sequence[int]) -> dict[int, tuple[str | Path, int]]:
+def rows_of_frames(
+    paths: Sequence[str | Path], frames: Sequence[int]
+) -> dict[int, tuple[str | Path, int]]:
     """Frame number -> (chunk file `<first>-<last>.<suffix>`, its row there)."""
     wanted = {int(frame) for frame in frames}
     return {

@@ -12,7 +12,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.imaging.images import write_image
 from vermilion.storage.files import atomic_path
 from vermilion.storage.progress import progress
-from vermilion.studio.labels import contours, write_contours, write_landmarks
+from vermilion.studio.labels import lip_contours, write_contours, write_landmarks
 from vermilion.studio.render import render
 from vermilion.studio.sensor import sensor_noise
 from vermilion.studio.surface import surface_of
@@ -49,7 +49,7 @@ def write_images(
     surface = surface_of(plan.model)
     for frame in progress(list(frames), f"{name}: frames"):
         index = frame - first
-        images = render(plan.stage(index, surface, **rays), plan.vertices_mm(index), cameras)
+        images = render(plan.scene(index, surface, **rays), plan.vertices_mm(index), cameras)
         for camera, image in images.items():
             place = f"{name}/{camera}"
             noisy = sensor_noise(image, noise_read, noise_shot, seed, place, frame)
@@ -68,7 +68,7 @@ def write_labels(
     surface = surface_of(plan.model)
     for camera, frame in contour_frames:
         vertices = plan.vertices_mm(frame - first)
-        loops = contours(plan.model, surface, vertices, cameras[camera])
+        loops = lip_contours(plan.model, surface, vertices, cameras[camera])
         image = f"frames/{camera}/{frame:06d}.png"
         write_contours(label_path(capture, "contours", camera, frame), image, loops)
     for camera, frame in landmark_frames:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -37,14 +38,17 @@ class MouthView:
     corner_px: np.ndarray
 
     def to_pixels(self, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Places in the crop (cell corners are whole numbers) to image pixels (N, 2)."""
+        """Places in the crop to image pixels (N, 2).
+
+        `columns` (N,) and `rows` (N,); cell corners are whole numbers.
+        """
         return np.stack([columns, rows], axis=-1) / SUBPIXELS + self.corner_px
 
 
 def view_mouth(
     model: FaceModel, surface: Surface, vertices_mm: np.ndarray, camera: Camera
 ) -> MouthView:
-    """Cast a fine grid of rays round the lips."""
+    """Cast a fine grid of rays round the lips of a head at `vertices_mm` (V, 3), world."""
     border = camera.project(vertices_mm[model.outer_contour])
     low = np.floor(border.min(axis=0) - 6)
     size = np.ceil(border.max(axis=0) + 6 - low).astype(int) * SUBPIXELS
@@ -60,11 +64,14 @@ def view_mouth(
     return MouthView(side.astype(np.uint8), outside & (lip > 0), low)
 
 
-def contours(
+def lip_contours(
     model: FaceModel, surface: Surface, vertices_mm: np.ndarray, camera: Camera
 ) -> dict[str, np.ndarray]:
-    """Closed polylines in pixels: `outer`, the visible vermilion border (n, 2), and `inner`, the
-    visible border of the mouth's opening (m, 2), which has no width where the lips touch."""
+    """The lip contours that a camera sees, as closed polylines in pixels.
+
+    `vertices_mm` (V, 3) in the world. `outer` (n, 2) is the visible vermilion border. `inner` (m, 2)
+    is the visible border of the mouth's opening; it has no width where the lips touch.
+    """
     view = view_mouth(model, surface, vertices_mm, camera)
     corners = camera.project(vertices_mm[model.inner_contour])[:, 0]
     return {"outer": _outer(view), "inner": _inner(view, corners.min(), corners.max())}
@@ -132,15 +139,15 @@ def _resampled(loop: np.ndarray, step_px: float) -> np.ndarray:
 
 
 def write_contours(path: str | Path, image: str, loops: dict[str, np.ndarray]) -> None:
-    """Write a contour label: closed polylines in pixels."""
-    content = {"unit": "px", "image": image}
+    """Write a contour label: closed polylines `loops`, (n, 2) pixels each."""
+    content: dict[str, Any] = {"unit": "px", "image": image}
     for name, points in loops.items():
         content[name] = {"closed": True, "points": np.round(points, 2).tolist()}
     _write(path, content)
 
 
 def write_landmarks(path: str | Path, image: str, points_px: np.ndarray) -> None:
-    """Write a landmark label: 66 points in pixels."""
+    """Write a landmark label: `points_px` (66, 2)."""
     _write(path, {"unit": "px", "image": image, "points": np.round(points_px, 2).tolist()})
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
-from vermilion.studio import kernels
+from vermilion.studio import light_kernels
 
 #: Rays start this far off the surface (mm), so that a vertex does not shade itself.
 OFFSET_MM = 0.12
@@ -90,7 +90,7 @@ def light_directions(lighting: Lighting) -> np.ndarray:
     return centres / np.linalg.norm(centres, axis=1, keepdims=True)
 
 
-def bake(
+def bake_light(
     caster: RayCaster,
     vertices_mm: np.ndarray,
     normals: np.ndarray,
@@ -99,10 +99,19 @@ def bake(
     n_directions: int = 192,
     n_points: int = 12,
 ) -> BakedLight:
-    """Ambient occlusion and soft shadows of the vertices `needed` (ids); the others stay dark.
+    """Ambient occlusion and soft shadows of some vertices; the others stay dark.
 
-    The directions and light points are the same for all vertices, so that neighbours differ
-    smoothly; a vertex's light depends on no camera.
+    The directions and the light points are the same for all vertices, so that neighbours differ
+    smoothly. A vertex's light depends on no camera.
+
+    Args:
+        caster: of the mesh.
+        vertices_mm: (V, 3) world.
+        normals: (V, 3) unit.
+        needed: (n,) ids of the vertices.
+        lighting: lights and sky.
+        n_directions: of the sky.
+        n_points: on each light.
     """
     directions = sphere_points(n_directions)
     colours = _sky_colours(directions, lighting)
@@ -114,11 +123,11 @@ def bake(
         part = needed[start : start + 8192]
         origins, rays, owner = _buffers(len(part) * n_directions)
         args = (vertices_mm, normals, part)
-        count = kernels.sky_rays(*args, directions, OFFSET_MM, origins, rays, owner)
+        count = light_kernels.sky_rays(*args, directions, OFFSET_MM, origins, rays, owner)
         blocked = caster.occluded(origins[:count], rays[:count])
-        kernels.gather_sky(owner[:count], blocked, normals, directions, colours, sky)
+        light_kernels.gather_sky(owner[:count], blocked, normals, directions, colours, sky)
         origins, rays, owner = _buffers(len(part) * targets.shape[0] * n_points)
-        count = kernels.light_rays(*args, targets, OFFSET_MM, origins, rays, owner)
+        count = light_kernels.light_rays(*args, targets, OFFSET_MM, origins, rays, owner)
         free = ~caster.occluded(origins[:count], rays[:count])
         np.add.at(visible, (owner[:count][free, 0], owner[:count][free, 1]), 1.0 / n_points)
     return BakedLight(sky, visible)
@@ -134,7 +143,7 @@ def sphere_points(count: int) -> np.ndarray:
 
 
 def smooth_normals(vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Vertex normals, (V, 3) float64."""
+    """Vertex normals (V, 3) float64 of `vertices_mm` (V, 3), `triangles` (T, 3)."""
     return vertex_normals(np.asarray(vertices_mm, dtype=np.float64), triangles)
 
 

@@ -117,7 +117,10 @@ def generated_weights(
 def start_at_neutral(
     names: tuple[str, ...], weights: np.ndarray, slight_open: float, ease_in_frames: int
 ) -> np.ndarray:
-    """Curves whose first frame is the neutral, mouth slightly open, and that ease in from it."""
+    """Curves (F, K) that ease in from the neutral, mouth slightly open, in their first frame.
+
+    `weights` (F, K) of the expressions `names`.
+    """
     neutral = np.zeros(len(names))
     if OPENING in names:
         neutral[names.index(OPENING)] = slight_open
@@ -131,7 +134,7 @@ def head_motion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """world_from_head rotations (F, 3, 3) and translations (F, 3) mm: slow sways about a centre.
 
-    The first frame is the identity.
+    `centre_mm` (3,) in the head frame. The first frame is the identity.
     """
     rng = np.random.default_rng([seed, 7003])
     time_s = np.arange(n_frames) / fps

@@ -10,13 +10,13 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.studio import kernels
-from vermilion.studio.lighting import Lighting, bake, light_directions, smooth_normals
+from vermilion.studio.lighting import Lighting, bake_light, light_directions, smooth_normals
 from vermilion.studio.look import Look, noise_volume
 from vermilion.studio.surface import Surface
 
 
 @dataclass(frozen=True)
-class Stage:
+class Scene:
     """What stays the same through a take: the surface, how it looks, how it is lit.
 
     Attributes:
@@ -47,40 +47,40 @@ class _View:
     pixel_angle: float
 
 
-def render(stage: Stage, vertices_mm: np.ndarray, cameras: dict[str, Camera]) -> dict:
+def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) -> dict:
     """Linear RGB images, name -> (h, w, 3) float32, of the head at `vertices_mm` (V, 3).
 
     The shading holds no randomness, and no camera's image depends on the others.
     """
     vertices = np.ascontiguousarray(vertices_mm, dtype=np.float64)
-    caster = RayCaster(vertices, stage.triangles)
-    normals = smooth_normals(vertices, stage.triangles)
-    views = {name: _look_through(stage, caster, normals, cam) for name, cam in cameras.items()}
+    caster = RayCaster(vertices, scene.triangles)
+    normals = smooth_normals(vertices, scene.triangles)
+    views = {name: _look_through(scene, caster, normals, cam) for name, cam in cameras.items()}
     needed = np.zeros(len(vertices), dtype=bool)
     for view in views.values():
         for hits in (view.hits, view.edge_hits):
             seen = np.unique(hits.triangle)
-            needed[stage.triangles[seen[seen >= 0]]] = True
-    light = bake(
+            needed[scene.triangles[seen[seen >= 0]]] = True
+    light = bake_light(
         caster,
         vertices,
         normals,
         np.flatnonzero(needed),
-        stage.lighting,
-        stage.n_directions,
-        stage.n_points,
+        scene.lighting,
+        scene.n_directions,
+        scene.n_points,
     )
-    return {name: _image(stage, view, normals, light) for name, view in views.items()}
+    return {name: _image(scene, view, normals, light) for name, view in views.items()}
 
 
-def _look_through(stage: Stage, caster: RayCaster, normals: np.ndarray, camera: Camera) -> _View:
+def _look_through(scene: Scene, caster: RayCaster, normals: np.ndarray, camera: Camera) -> _View:
     key = (camera.model, camera.params, camera.width_px, camera.height_px)
     origin = camera.centre_mm.astype(np.float32)
     directions = _world(_local_directions(*key, offset=(0.5, 0.5)), camera)
     hits = caster.cast(origin, directions)
-    edge = _edges(stage, hits, normals)
+    edge = _edges(scene, hits, normals)
     rows, columns = np.nonzero(edge)
-    offsets = sample_offsets(stage.edge_samples)
+    offsets = sample_offsets(scene.edge_samples)
     extra = np.stack(
         [_world(_local_directions(*key, offset=tuple(o))[rows, columns], camera) for o in offsets]
     )
@@ -89,18 +89,18 @@ def _look_through(stage: Stage, caster: RayCaster, normals: np.ndarray, camera: 
     return _View(directions.shape[:2], directions, hits, edge, extra, extra_hits, 1.0 / scale)
 
 
-def _image(stage: Stage, view: _View, normals: np.ndarray, light) -> np.ndarray:
-    image = _shaded(stage, view.directions, view.hits, normals, light, view.pixel_angle)
+def _image(scene: Scene, view: _View, normals: np.ndarray, light) -> np.ndarray:
+    image = _shaded(scene, view.directions, view.hits, normals, light, view.pixel_angle)
     if view.edge.any():
         samples = _shaded(
-            stage, view.edge_directions, view.edge_hits, normals, light, view.pixel_angle
+            scene, view.edge_directions, view.edge_hits, normals, light, view.pixel_angle
         )
         image[view.edge] = samples.mean(axis=0)
     return image
 
 
-def _shaded(stage: Stage, directions, hits: Hits, normals, light, pixel_angle) -> np.ndarray:
-    surface, shape = stage.surface, hits.triangle.shape
+def _shaded(scene: Scene, directions, hits: Hits, normals, light, pixel_angle) -> np.ndarray:
+    surface, shape = scene.surface, hits.triangle.shape
     out = np.empty((hits.triangle.size, 3), dtype=np.float32)
     kernels.shade(
         out,
@@ -109,7 +109,7 @@ def _shaded(stage: Stage, directions, hits: Hits, normals, light, pixel_angle) -
         directions.reshape(-1, 3),
         hits.distance_mm.reshape(-1),
         pixel_angle,
-        stage.triangles,
+        scene.triangles,
         surface.material,
         normals,
         surface.solid_mm,
@@ -117,22 +117,22 @@ def _shaded(stage: Stage, directions, hits: Hits, normals, light, pixel_angle) -
         surface.inside_mm,
         light.sky,
         light.visible,
-        light_directions(stage.lighting),
-        np.array([one.colour for one in stage.lighting.lights]),
+        light_directions(scene.lighting),
+        np.array([one.colour for one in scene.lighting.lights]),
         _noise(),
-        stage.look,
+        scene.look,
         surface.brows_mm,
         surface.chin_mm,
-        np.array(stage.lighting.background),
+        np.array(scene.lighting.background),
     )
     return out.reshape(*shape, 3)
 
 
-def _edges(stage: Stage, hits: Hits, normals: np.ndarray) -> np.ndarray:
+def _edges(scene: Scene, hits: Hits, normals: np.ndarray) -> np.ndarray:
     """Pixels (h, w) bool across which the surface, its depth or its direction jumps."""
     triangle = hits.triangle
-    first = stage.triangles[np.maximum(triangle, 0), 0]
-    kind = np.where(triangle >= 0, stage.surface.material[np.maximum(triangle, 0)], 99)
+    first = scene.triangles[np.maximum(triangle, 0), 0]
+    kind = np.where(triangle >= 0, scene.surface.material[np.maximum(triangle, 0)], 99)
     depth = np.where(triangle >= 0, hits.distance_mm, 1e6)
     normal = normals[first].astype(np.float32)
     edge = np.zeros(triangle.shape, dtype=bool)

@@ -62,7 +62,7 @@ def lips16_rig(
         (LIP_ANGLES_DEG, lips, lip_size_px, lip_view_mm),
     ):
         for name, (turn, height) in angles.items():
-            cameras[name] = aimed(name, target, turn, height, distance_mm, size, view)
+            cameras[name] = aimed_camera(name, target, turn, height, distance_mm, size, view)
     return cameras
 
 
@@ -75,13 +75,13 @@ def video_camera(
     turn_deg: float = 0.0,
     height_deg: float = 2.0,
 ) -> dict[str, Camera]:
-    """One camera in front of the face."""
+    """One camera in front of the face of a neutral `neutral_mm` (V, 3)."""
     target = face_centre(model, neutral_mm)
-    camera = aimed("cam", target, turn_deg, height_deg, distance_mm, size_px, view_mm)
+    camera = aimed_camera("cam", target, turn_deg, height_deg, distance_mm, size_px, view_mm)
     return {"cam": camera}
 
 
-def aimed(
+def aimed_camera(
     name: str,
     target_mm: np.ndarray,
     turn_deg: float,
@@ -90,7 +90,10 @@ def aimed(
     size_px: tuple[int, int],
     view_mm: float,
 ) -> Camera:
-    """A pinhole camera round the head that looks at the target and covers `view_mm` of height."""
+    """A pinhole camera that looks at a target and covers `view_mm` of height there.
+
+    `target_mm` (3,) world; `turn_deg` about the vertical, `height_deg` above the horizon.
+    """
     turn, height = np.radians(turn_deg), np.radians(height_deg)
     direction = np.array(
         [np.sin(turn) * np.cos(height), np.sin(height), np.cos(turn) * np.cos(height)]
@@ -101,12 +104,12 @@ def aimed(
 
 
 def lips_centre(model: FaceModel, vertices_mm: np.ndarray) -> np.ndarray:
-    """Middle of the vermilion border, (3,) mm."""
+    """Middle of the vermilion border of `vertices_mm` (V, 3), (3,) mm."""
     return vertices_mm[model.outer_contour].mean(axis=0)
 
 
 def face_centre(model: FaceModel, vertices_mm: np.ndarray) -> np.ndarray:
-    """Between brows and chin, at the depth of the lips, (3,) mm."""
+    """Between brows and chin of `vertices_mm` (V, 3), at the depth of the lips, (3,) mm."""
     points = vertices_mm[model.landmarks]
     top, bottom = points[17:27, 1].max() + 12.0, points[8, 1]
     return np.array([points[27, 0], 0.5 * (top + bottom), lips_centre(model, vertices_mm)[2]])

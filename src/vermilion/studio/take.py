@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,9 @@ from vermilion.studio.performance import (
     random_poses,
     start_at_neutral,
 )
-from vermilion.studio.render import Stage
+from vermilion.studio.render import Scene
 from vermilion.studio.surface import Surface
+from vermilion.studio.take_settings import TakeSettings
 
 #: Largest turn of the heads of a `people` take: sideways, nodding, tilting (degrees).
 FREE_TURN_DEG = (24.0, 11.0, 7.0)
@@ -60,18 +62,20 @@ class StudioTakePlan:
         return self.model.neutral_of(self.identities[0])
 
     def look(self, index: int) -> Look:
+        """Colours of the index-th frame's person."""
         return look_of(int(self.looks[index]), self.tattoo)
 
     def light(self, index: int) -> Lighting:
+        """Light of the index-th frame."""
         return LIGHTINGS[self.lighting[index]]
 
-    def stage(self, index: int, surface: Surface, **rays: int) -> Stage:
+    def scene(self, index: int, surface: Surface, **rays: int) -> Scene:
         """What the renderer needs of the index-th frame."""
-        return Stage(self.model.triangles, surface, self.look(index), self.light(index), **rays)
+        return Scene(self.model.triangles, surface, self.look(index), self.light(index), **rays)
 
 
 def identity_of(
-    model: FaceModel, coefficients: list[float] | None, seed: int, spread: float
+    model: FaceModel, coefficients: Sequence[float] | None, seed: int, spread: float
 ) -> np.ndarray:
     """Identity coefficients (I,): those given (the rest 0), or drawn from the seed."""
     if coefficients is None:
@@ -83,55 +87,41 @@ def identity_of(
     return identity
 
 
-def plan_take(
-    model: FaceModel,
-    *,
-    role: str,
-    n_frames: int,
-    fps: float,
-    subject_seed: int,
-    take_seed: int,
-    identity: np.ndarray,
-    performance: str = "generated",
-    poses: int = 0,
-    pose_seconds: tuple[float, float] = (0.22, 0.42),
-    csv: str | None = None,
-    csv_first: int = 0,
-    csv_fps: float = 30.0,
-    lights: str = "rig",
-    slight_open: float = 0.08,
-    ease_in_frames: int = 6,
-    intensity: float = 1.0,
-    head_turn_deg: float = 2.5,
-    head_shift_mm: float = 2.0,
-) -> StudioTakePlan:
-    """Plan a take of one actor; the first frame is the neutral, mouth slightly open.
-
-    `role` is that of the take sheet: only `tattoo` paints the lips.
-    """
-    names = model.expression_names
-    seed = int(np.random.default_rng([subject_seed, take_seed]).integers(2**31))
-    if performance == "live_link":
-        weights = read_live_link(csv, names, n_frames, fps, csv_first, csv_fps)
-    else:
-        weights = generated_weights(
-            names, n_frames, fps, seed, intensity, poses, tuple(pose_seconds)
-        )
-    weights = start_at_neutral(names, weights, slight_open, ease_in_frames)
-    neck = model.neutral_mm[model.landmarks[8]] + [0.0, -40.0, -70.0]
-    motion = head_motion(n_frames, fps, seed, head_turn_deg, head_shift_mm, neck)
+def plan_take(model: FaceModel, settings: TakeSettings) -> StudioTakePlan:
+    """Plan a take; the first frame of an actor's take is the neutral, mouth slightly open."""
+    actor, performance, motion = settings.actor, settings.performance, settings.motion
+    n_frames, names = settings.n_frames, model.expression_names
+    if performance.performance == "people":
+        return plan_people(model, n_frames, actor.seed + performance.seed, actor.identity_spread)
+    seed = int(np.random.default_rng([actor.seed, performance.seed]).integers(2**31))
+    weights = _weights(settings, names, seed)
+    weights = start_at_neutral(names, weights, motion.slight_open, motion.ease_in_frames)
+    neck_mm = model.neutral_mm[model.landmarks[8]] + [0.0, -40.0, -70.0]
+    head = head_motion(
+        n_frames, settings.fps, seed, motion.head_turn_deg, motion.head_shift_mm, neck_mm
+    )
+    identity = identity_of(model, actor.identity, actor.seed, actor.identity_spread)
     return StudioTakePlan(
         model=model,
         identities=np.broadcast_to(identity, (n_frames, len(identity))),
-        performance=Performance(names, weights, *motion),
-        looks=np.full(n_frames, subject_seed),
-        lighting=(lights,) * n_frames,
-        tattoo=role == "tattoo",
+        performance=Performance(names, weights, *head),
+        looks=np.full(n_frames, actor.seed),
+        lighting=(performance.lights,) * n_frames,
+        tattoo=settings.role == "tattoo",
     )
 
 
+def _weights(settings: TakeSettings, names: tuple[str, ...], seed: int) -> np.ndarray:
+    """Expression curves (F, K) of an actor's take, recorded or generated from the seed."""
+    how, n_frames, fps = settings.performance, settings.n_frames, settings.fps
+    if how.performance == "live_link":
+        return read_live_link(how.csv, names, n_frames, fps, how.csv_first, how.csv_fps)
+    intensity = settings.motion.intensity
+    return generated_weights(names, n_frames, fps, seed, intensity, how.poses, how.pose_seconds)
+
+
 def plan_people(model: FaceModel, n_frames: int, seed: int, spread: float) -> StudioTakePlan:
-    """Every frame another random person, expression, pose and light."""
+    """A take whose every frame has another random person, expression, pose and light."""
     rng = np.random.default_rng([seed, 7005])
     identities = spread * np.clip(rng.standard_normal((n_frames, model.n_identities)), -2, 2)
     angles = rng.uniform(-1, 1, (n_frames, 3)) * FREE_TURN_DEG
@@ -148,57 +138,6 @@ def plan_people(model: FaceModel, n_frames: int, seed: int, spread: float) -> St
         looks=rng.integers(2**31, size=n_frames),
         lighting=tuple(kinds[i] for i in rng.integers(len(kinds), size=n_frames)),
         tattoo=False,
-    )
-
-
-def plan_of(
-    model: FaceModel,
-    *,
-    role: str,
-    first: int,
-    last: int,
-    fps: float,
-    actor: dict,
-    performance: dict,
-    identity_spread: float,
-    seed: int,
-    slight_open: float,
-    ease_in_frames: int,
-    intensity: float,
-    head_turn_deg: float,
-    head_shift_mm: float,
-) -> StudioTakePlan:
-    """Plan a take of the take sheet from plain values.
-
-    Args:
-        actor: `seed` and `identity` of the subject.
-        performance: `performance`, `seed`, `poses`, `pose_seconds`, `csv`, `csv_first`, `csv_fps`
-            and `lights` of the take.
-    """
-    n_frames = last - first + 1
-    actor_seed = int(np.random.default_rng([seed, actor["seed"]]).integers(2**31))
-    if performance["performance"] == "people":
-        return plan_people(model, n_frames, actor_seed + performance["seed"], identity_spread)
-    return plan_take(
-        model,
-        role=role,
-        n_frames=n_frames,
-        fps=fps,
-        subject_seed=actor_seed,
-        take_seed=performance["seed"],
-        identity=identity_of(model, actor["identity"], actor_seed, identity_spread),
-        performance=performance["performance"],
-        poses=performance["poses"],
-        pose_seconds=performance["pose_seconds"],
-        csv=performance["csv"],
-        csv_first=performance["csv_first"],
-        csv_fps=performance["csv_fps"],
-        lights=performance["lights"],
-        slight_open=slight_open,
-        ease_in_frames=ease_in_frames,
-        intensity=intensity,
-        head_turn_deg=head_turn_deg,
-        head_shift_mm=head_shift_mm,
     )
 
 

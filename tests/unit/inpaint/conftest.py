@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from tests import lip_patch
+from vermilion.geometry.raycast import RayCaster
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
-from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +28,7 @@ def textures(model, domain):
 
     def baked(tattoo, names):
         views = [(rig[n], lip_patch.render(model, rest, rig[n], tattoo)) for n in names]
-        return bake(domain, rest, model.triangles, views)
+        return bake(domain, RayCaster(rest, model.triangles), rest, views)
 
     return baked(False, rig), baked(True, rig), baked(True, ["front"])
 
@@ -35,4 +36,4 @@ def textures(model, domain):
 @pytest.fixture(scope="session")
 def opacity(domain, textures):
     mask = tattoo_mask(domain, textures[1], textures[0], reach_mm=4.0, sensitivity=6.0)
-    return feathered(domain, mask, border_mm=0.6, feather_mm=1.0)
+    return feather_mask(domain, mask, border_mm=0.6, feather_mm=1.0)

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import Texture, bake
 from vermilion.inpaint.composite import Layer, Window, composite
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.fields import fill_holes, sample, weighted_blur
 from vermilion.inpaint.files import read_texture, write_texture
-from vermilion.inpaint.grain import add_grain, fine_deviation, seed_of
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading, bare_skin, change_ratio
-from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
+from vermilion.inpaint.grain import add_grain, fine_deviation, noise_seed
+from vermilion.inpaint.shading import ShadingSettings, bare_skin, change_ratio
+from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 from vermilion.storage.errors import InputError
 
 # Fields
@@ -95,10 +96,14 @@ def test_textures_survive_the_disc_and_name_a_wrong_domain(tmp_path, model, doma
 # Baking
 
 
+def rest_caster(model) -> RayCaster:
+    return RayCaster(model.neutral_mm, model.triangles)
+
+
 def test_a_white_mesh_bakes_white_and_the_hidden_inside_stays_unseen(model, domain):
     camera = lip_patch.cameras()["front"]
     white = np.ones((180, 240, 3), np.float32)
-    texture = bake(domain, model.neutral_mm, model.triangles, [(camera, white)])
+    texture = bake(domain, rest_caster(model), model.neutral_mm, [(camera, white)])
     assert np.allclose(texture.rgb[texture.seen], 1.0, atol=1e-5)
     assert texture.seen[domain.valid & ~domain.inner].mean() > 0.8
     assert texture.seen[domain.inner].mean() < 0.2
@@ -110,8 +115,8 @@ def test_views_of_another_exposure_are_brought_to_the_first(model, domain):
         (rig[name], lip_patch.render(model, model.neutral_mm, rig[name], False, light))
         for name, light in (("front", 1.0), ("left", 0.9))
     ]
-    both = bake(domain, model.neutral_mm, model.triangles, views)
-    alone = bake(domain, model.neutral_mm, model.triangles, views[:1])
+    both = bake(domain, rest_caster(model), model.neutral_mm, views)
+    alone = bake(domain, rest_caster(model), model.neutral_mm, views[:1])
     seen = both.seen & alone.seen
     assert np.median(both.rgb[seen] / alone.rgb[seen]) == pytest.approx(1.0, abs=0.02)
 
@@ -133,7 +138,7 @@ def test_without_a_tattoo_only_the_lips_are_painted(domain, textures):
 
 def test_the_feather_falls_from_one_to_zero_over_its_width(domain):
     mask = domain.valid & (domain.lip_distance_mm < 1.0)
-    opacity = feathered(domain, mask, border_mm=1.0, feather_mm=2.0)
+    opacity = feather_mask(domain, mask, border_mm=1.0, feather_mm=2.0)
     distance = domain.distance_mm(mask, 10.0)
     assert (opacity[domain.valid & (distance < 1.0)] == 1).all()
     assert (opacity[distance > 3.01] == 0).all()
@@ -152,7 +157,7 @@ def test_the_change_of_light_is_found_whatever_the_tattoo(domain):
     light = (0.8 + 0.5 * x) * np.ones(domain.shape)
     reference = Texture((ink * weight[..., None]).astype(np.float32), weight)
     frame = Texture((ink * (weight * light)[..., None]).astype(np.float32), weight)
-    ratio = change_ratio(domain, reference, frame, Shading())
+    ratio = change_ratio(domain, reference, frame, ShadingSettings())
     assert np.median(np.abs(ratio / light - 1)[domain.valid]) < 0.03
 
 
@@ -184,9 +189,9 @@ def test_pixels_without_paint_keep_their_bits():
 def test_noise_has_the_deviation_asked_for_and_its_seed():
     grey = np.full((80, 80, 3), 0.3, np.float32)
     opacity = np.ones((80, 80), np.float32)
-    noisy = add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 3))
-    assert np.array_equal(noisy, add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 3)))
-    assert not np.array_equal(noisy, add_grain(grey, opacity, 0.02, seed_of(0, "s", "t", 4)))
+    noisy = add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 3))
+    assert np.array_equal(noisy, add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 3)))
+    assert not np.array_equal(noisy, add_grain(grey, opacity, 0.02, noise_seed(0, "s", "t", 4)))
     assert fine_deviation(noisy, opacity > 0) == pytest.approx(0.02, rel=0.3)
 
 
@@ -199,8 +204,10 @@ def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opa
     camera = lip_patch.cameras()["front"]
     tattooed = lip_patch.render(model, vertices, camera, tattoo=True)
     truth = lip_patch.render(model, vertices, camera, tattoo=False)
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, grain=False)
-    painted = paint_frame(paint, tattooed, camera, vertices, model.triangles, (0,))
+    paint = InpaintInputs(
+        domain, textures[0], textures[2], opacity, ShadingSettings(), 0.3, 0.0, grain=False
+    )
+    painted = inpaint_frame(paint, tattooed, camera, vertices, model.triangles, (0,))
     where = np.abs(to_display(tattooed).astype(int) - to_display(truth)).max(axis=2) > 20
     where = cv2.dilate(where.astype(np.uint8), np.ones((3, 3))) > 0
     telea = cv2.inpaint(to_display(tattooed), where.astype(np.uint8), 4, cv2.INPAINT_TELEA)
@@ -218,7 +225,7 @@ def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opa
 
 def test_lips_outside_the_image_are_left_alone(model, domain, textures, opacity):
     camera = lip_patch.cameras()["front"]
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading())
+    paint = InpaintInputs(domain, textures[0], textures[2], opacity, ShadingSettings())
     away = model.neutral_mm + np.array([500.0, 0.0, 0.0])
     blank = np.zeros((180, 240, 3), np.float32)
-    assert paint_frame(paint, blank, camera, away, model.triangles, (0,)) is None
+    assert inpaint_frame(paint, blank, camera, away, model.triangles, (0,)) is None

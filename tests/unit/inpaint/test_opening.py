@@ -10,9 +10,10 @@ import pytest
 
 from tests import lip_patch
 from vermilion.geometry.raycast import RayCaster
-from vermilion.inpaint.opening import Evidence, find_opening
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
+from vermilion.inpaint.opening import MouthPlace, OpeningSettings
+from vermilion.inpaint.opening_search import find_opening
+from vermilion.inpaint.shading import ShadingSettings
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +24,12 @@ def open_mouth(model):
     return camera, vertices, lip_patch.render(model, vertices, camera, tattoo=True)
 
 
-def opening_of(model, domain, camera, image, vertices, **evidence):
+def opening_of(model, domain, camera, image, vertices, **settings):
     ends = camera.project(vertices[domain.corners])
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    box = (np.zeros(2), np.array([camera.width_px, camera.height_px]))
+    place = MouthPlace(axis, np.zeros(2), np.array([camera.width_px, camera.height_px]), 1 / 3)
     caster = RayCaster(vertices, model.triangles)
-    return find_opening(domain, caster, camera, image, axis, box, 1 / 3, Evidence(**evidence))
+    return find_opening(domain, caster, camera, image, place, OpeningSettings(**settings))
 
 
 def wrong_pixels(opening, open_mouth, model) -> int:
@@ -65,9 +66,11 @@ def test_an_opening_that_the_mesh_has_right_stays(model, domain, open_mouth):
 
 def test_what_lies_behind_the_lips_is_not_painted(model, domain, textures, opacity, open_mouth):
     camera, vertices, image = open_mouth
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, 0.0, grain=False)
+    paint = InpaintInputs(
+        domain, textures[0], textures[2], opacity, ShadingSettings(), 0.3, 0.0, 0.0, grain=False
+    )
     wrong = lower_lip_raised(vertices, 1.5)
-    painted = paint_frame(paint, image, camera, wrong, model.triangles, (0,))
+    painted = inpaint_frame(paint, image, camera, wrong, model.triangles, (0,))
     behind = ~RayCaster(vertices, model.triangles).see(camera).hit
     behind = cv2.erode(behind.astype(np.uint8), np.ones((5, 5))) > 0
     changed = np.abs(painted.linear - image).max(axis=2) > 0.02
@@ -76,8 +79,10 @@ def test_what_lies_behind_the_lips_is_not_painted(model, domain, textures, opaci
 
 def test_a_shadow_between_the_lips_is_kept(model, domain, textures, opacity):
     camera, vertices = lip_patch.cameras()["front"], model.neutral_mm
-    paint = Paint(domain, textures[0], textures[2], opacity, Shading(), 0.3, 0.0, 0.0, grain=False)
-    flat = replace(paint, shading=Shading(seam_mm=0.0))
+    paint = InpaintInputs(
+        domain, textures[0], textures[2], opacity, ShadingSettings(), 0.3, 0.0, 0.0, grain=False
+    )
+    flat = replace(paint, shading=ShadingSettings(seam_mm=0.0))
     middle = camera.project(np.zeros((1, 3)))[0, 1]
     away = np.abs(camera.pixel_grid()[..., 1] - middle)
     shadow = np.clip(away / 6.0, 0.3, 1.0).astype(np.float32)[..., None]
@@ -87,7 +92,7 @@ def test_a_shadow_between_the_lips_is_kept(model, domain, textures, opacity):
     lips = (opening_rim(model, camera, vertices)) & (away < 7.0)
     with_seam, without = (
         lip_patch.psnr_db(
-            paint_frame(p, inked, camera, vertices, model.triangles, (0,)).linear, truth, lips
+            inpaint_frame(p, inked, camera, vertices, model.triangles, (0,)).linear, truth, lips
         )
         for p in (paint, flat)
     )

@@ -15,7 +15,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
-from vermilion.storage.sequences import locate, read_sequence
+from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake
 
 
@@ -33,7 +33,7 @@ class TrackedRings:
         """Outer and inner ring (n, 2) px of a frame; None where it is not tracked."""
         if frame not in self.frames:
             return None
-        ((path, row),) = locate(self.coarse, [frame]).values()
+        ((path, row),) = rows_of_frames(self.coarse, [frame]).values()
         return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
 
 

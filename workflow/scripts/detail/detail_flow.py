@@ -10,7 +10,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
-from vermilion.storage.sequences import locate, read_sequence, write_sequence
+from vermilion.storage.sequences import read_sequence, rows_of_frames, write_sequence
 from vermilion.storage.tables import write_table
 from vermilion.tracking.result import TrackedTake
 
@@ -21,7 +21,7 @@ def main(snakemake):
     model, camera = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit).camera
     source = open_frames(params.source, subject, take)
     first, last = params.span
-    places = locate(inputs.coarse, range(first, last + 1))
+    places = rows_of_frames(inputs.coarse, range(first, last + 1))
 
     def read_image(frame):
         return source.read(camera.name, frame)

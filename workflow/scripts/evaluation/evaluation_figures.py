@@ -8,7 +8,7 @@ from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.report import mesh_sheets
-from vermilion.report.figures import curves
+from vermilion.report.figures import plot_curves
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -46,8 +46,8 @@ def with_bar(image, bar):
 
 def main(snakemake):
     cfg = FiguresConfig(**snakemake.params.cfg["evaluation.figures"])
-    shown, out = read_arrays(snakemake.input.maps, "file of the evaluation"), snakemake.output
-    size = cfg.map_size_px
+    shown = read_arrays(snakemake.input.maps, "file of the evaluation")
+    out, size = snakemake.output, cfg.map_size_px
     frames, triangles = shown["frames"], shown["triangles"]
     meshes = of_regressors(shown, "meshes_mm")
     base = meshes["base"]
@@ -57,7 +57,7 @@ def main(snakemake):
     columns = mesh_sheets.error_columns(
         meshes, of_regressors(shown, "errors_mm"), triangles, cfg.error_scale_mm
     )
-    image = mesh_sheets.sheet(columns, frames, np.nanmean(mouth, axis=1), wide, size)
+    image = mesh_sheets.render_sheet(columns, frames, np.nanmean(mouth, axis=1), wide, size)
     bar = mesh_sheets.error_bar(image.shape[1], cfg.error_scale_mm)
     write_srgb8(out.maps, with_bar(image, bar))
 
@@ -67,18 +67,20 @@ def main(snakemake):
     columns = mesh_sheets.clay_columns(meshes, triangles, shown["vermilion"])
     red = mesh_sheets.labels_nearby(shown["vermilion"], shown["points_mm"][0], surface[0])
     columns += mesh_sheets.clay_columns({"truth": surface}, shown["surface_triangles"], red)
-    write_srgb8(out.renders, mesh_sheets.sheet(columns, *place, images(snakemake, shown, size)))
+    write_srgb8(
+        out.renders, mesh_sheets.render_sheet(columns, *place, images(snakemake, shown, size))
+    )
 
     columns = mesh_sheets.stretch_columns(
         meshes | {"truth": shown["points_mm"]},
         of_regressors(shown, "neutrals_mm") | {"truth": shown["rest_mm"]},
         triangles,
     )
-    image = mesh_sheets.sheet(columns, *place)
+    image = mesh_sheets.render_sheet(columns, *place)
     write_srgb8(out.stretch, with_bar(image, mesh_sheets.stretch_bar(image.shape[1])))
 
     title = f"{snakemake.wildcards.subject}/{snakemake.wildcards.take}"
-    curves(read_table(snakemake.input.frames), title, out.curves)
+    plot_curves(read_table(snakemake.input.frames), title, out.curves)
 
 
 if __name__ == "__main__":

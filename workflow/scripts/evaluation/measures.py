@@ -9,7 +9,7 @@ from vermilion.evaluation.kind_errors import kind_rows
 from vermilion.evaluation.measures import COLUMNS, seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.report.feature_tables import estimators, table2, table3
-from vermilion.report.figures import bars, figure16
+from vermilion.report.figures import plot_figure16, plot_table1
 from vermilion.report.table1 import table1
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table, write_table
@@ -41,12 +41,12 @@ def main(snakemake):
     write_table(snakemake.output.table3, table3(summary))
     write_table(snakemake.output.estimators, estimators(curves, summary, configured))
     tables = [read_table(path) for path in snakemake.input.frames]
-    figure16(
+    plot_figure16(
         dict(zip([take["take"] for take in snakemake.params.takes], tables, strict=True)),
         rbf_and_affine(configured),
         snakemake.output.figure16,
     )
-    bars(summary, snakemake.output.image)
+    plot_table1(summary, snakemake.output.image)
     print(summary.to_string())
 
 

@@ -5,15 +5,16 @@ import numpy as np
 from vermilion.config.inpaint import CompositeConfig, DomainConfig, OpeningConfig, ShadingConfig
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
+from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
-from vermilion.imaging.images import write_image, write_srgb8
+from vermilion.imaging.images import write_srgb8
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture
-from vermilion.inpaint.grain import seed_of
-from vermilion.inpaint.opening import Evidence
-from vermilion.inpaint.overlay import before_after, sheet
-from vermilion.inpaint.paint import Paint, paint_frame
-from vermilion.inpaint.shading import Shading
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
+from vermilion.inpaint.grain import noise_seed
+from vermilion.inpaint.opening import OpeningSettings
+from vermilion.inpaint.overlay import before_after, contact_sheet
+from vermilion.inpaint.shading import ShadingSettings
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 from vermilion.storage.frames import evenly_spaced
@@ -23,29 +24,29 @@ from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import read_sequence
 
 
-def paint_of(snakemake, model, place):
+def take_inputs(snakemake, model, place):
     """What does not change from frame to frame."""
     cfg = DomainConfig(**snakemake.params.cfg["inpaint.domain"])
-    how = CompositeConfig(**snakemake.params.cfg["inpaint.composite"])
-    shading = ShadingConfig(**snakemake.params.cfg["inpaint.shading"])
+    how = CompositeConfig(**snakemake.params.cfg["inpaint.composite"]).model_dump()
+    shading = ShadingConfig(**snakemake.params.cfg["inpaint.shading"]).model_dump()
+    opening = OpeningConfig(**snakemake.params.cfg["inpaint.opening"]).model_dump()
     domain = lip_domain(model, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
     plain, _ = read_texture(snakemake.input.plain, domain, **place)
     reference, more = read_texture(snakemake.input.reference, domain, **place)
-    light = shading.model_dump()
-    gap_mm = light.pop("gap_mm")
-    paint = Paint(
-        domain, plain, reference, more["opacity"], Shading(**light), cfg.edge_mm,
-        how.lens_px, how.rim_px, how.samples, how.grain, gap_mm,
-        Evidence(**OpeningConfig(**snakemake.params.cfg["inpaint.opening"]).model_dump()),
+    seed = how.pop("seed")
+    inputs = InpaintInputs(
+        domain, plain, reference, more["opacity"],
+        gap_mm=shading.pop("gap_mm"), shading=ShadingSettings(**shading),
+        edge_mm=cfg.edge_mm, opening=OpeningSettings(**opening), **how,
     )  # fmt: skip
-    return paint, how.seed
+    return inputs, seed
 
 
 def main(snakemake):
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     name = snakemake.params.cfg["capture.frontal_camera"]
     model = FaceModel.load(snakemake.input.template)
-    paint, seed = paint_of(snakemake, model, place)
+    inputs, seed = take_inputs(snakemake, model, place)
     camera = read_cameras(snakemake.input.cameras)[name]
     source = open_frames(snakemake.params.source, **place)
     meshes = read_sequence(snakemake.input.meshes)
@@ -61,20 +62,22 @@ def main(snakemake):
             vertices = np.asarray(meshes[index], dtype=np.float64)
             painted = None
             if np.isfinite(vertices).all():
-                noise = seed_of(seed, **place, frame=frame)
-                painted = paint_frame(paint, linear, camera, vertices, model.triangles, noise)
+                noise = noise_seed(seed, **place, frame=frame)
+                painted = inpaint_frame(inputs, linear, camera, vertices, model.triangles, noise)
             if painted is None:
                 rows.append(QualityRow(frame, False, "no mesh in the image"))
                 continue
-            write_image(folder / f"{frame:06d}.png", painted.linear)
+            after = to_display(painted.linear)
+            write_srgb8(folder / f"{frame:06d}.png", after)
             figures = {
                 "composited_px": painted.composited_px,
                 "border_levels8": painted.border_levels,
             }
             rows.append(QualityRow(frame, figures=figures))
             if frame in shown:
-                tiles.append(before_after(frame, linear, painted))
-    write_srgb8(snakemake.output.overlay, sheet(tiles))
+                before = np.rint(painted.before * 255).astype(np.uint8)
+                tiles.append(before_after(frame, before, after[painted.window.slices]))
+    write_srgb8(snakemake.output.overlay, contact_sheet(tiles))
     write_quality(snakemake.output.quality, **place, stage="inpaint", rows=rows)
 
 

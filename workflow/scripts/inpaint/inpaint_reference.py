@@ -3,13 +3,14 @@
 from vermilion.config.inpaint import DomainConfig, MaskConfig
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
-from vermilion.inpaint.bake import bake
+from vermilion.inpaint.bake import blend, view_texels
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture, write_texture
 from vermilion.inpaint.overlay import texture_sheet
-from vermilion.inpaint.tattoo import feathered, tattoo_mask
+from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 from vermilion.inpaint.views import read_views
 from vermilion.multiview.files import read_neutral
 from vermilion.storage.logfile import log_to
@@ -27,10 +28,11 @@ def main(snakemake):
     frontal = snakemake.params.cfg["capture.frontal_camera"]
     views = read_views(source, cameras, frontal, snakemake.params.neutral, **place)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
-    tattooed = bake(domain, neutral, model.triangles, views, cfg.edge_mm)
-    reference = bake(domain, neutral, model.triangles, views[:1], cfg.edge_mm)
+    caster = RayCaster(neutral, model.triangles)
+    seen = view_texels(domain, caster, neutral, views, cfg.edge_mm)
+    tattooed, reference = blend(domain, seen), blend(domain, seen[:1])
     mask = tattoo_mask(domain, tattooed, plain, look.reach_mm, look.sensitivity, look.closing_mm)
-    opacity = feathered(domain, mask, look.border_mm, look.feather_mm)
+    opacity = feather_mask(domain, mask, look.border_mm, look.feather_mm)
     print(f"painted: {(opacity > 0.5).sum() * cfg.texel_mm**2:.0f} mm2")
     write_texture(snakemake.output.reference, reference, {"opacity": opacity})
     write_srgb8(snakemake.output.overlay, texture_sheet(plain, tattooed, opacity))

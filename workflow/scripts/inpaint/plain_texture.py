@@ -3,6 +3,7 @@
 from vermilion.config.inpaint import DomainConfig
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
+from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.inpaint.bake import bake
@@ -24,7 +25,8 @@ def main(snakemake):
     frontal = snakemake.params.cfg["capture.frontal_camera"]
     views = read_views(source, cameras, frontal, snakemake.params.neutral, **place)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
-    texture = bake(domain, neutral, model.triangles, views, cfg.edge_mm)
+    caster = RayCaster(neutral, model.triangles)
+    texture = bake(domain, caster, neutral, views, cfg.edge_mm)
     print(
         f"{len(views)} views cover {texture.seen.sum() / domain.valid.sum():.0%} of the lips' patch"
     )

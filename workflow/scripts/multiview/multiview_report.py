@@ -19,13 +19,13 @@ from vermilion.multiview.files import read_anchors, read_neutral
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, RefineSettings
-from vermilion.report.multiview_page import Findings, choose_frames, join_frames, report_page
+from vermilion.report.multiview_page import TakeFindings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
 from vermilion.storage.files import atomic_path
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.storage.sequences import locate, read_sequence
+from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.storage.tables import read_table, write_table
 
 
@@ -36,7 +36,7 @@ def joined(paths):
 
 def rows_at(paths, frames, read):
     """Frame number -> its row of the chunk files, where there is one."""
-    return {frame: read(path)[row] for frame, (path, row) in locate(paths, frames).items()}
+    return {frame: read(path)[row] for frame, (path, row) in rows_of_frames(paths, frames).items()}
 
 
 def main(snakemake):
@@ -74,7 +74,7 @@ def main(snakemake):
         sheets.draw(number, reason, meshes.get(number), seeing.get(number))
         for number, reason in progress(list(why.items()), "sheets")
     ]
-    found = Findings(
+    found = TakeFindings(
         "/".join(place.values()),
         snakemake.params.neutral,
         sorted(images.cameras),

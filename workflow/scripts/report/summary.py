@@ -8,8 +8,8 @@ import pandas as pd
 from vermilion.report.summary import (
     FRAME_COLUMNS,
     REGRESSOR_COLUMNS,
-    Findings,
     Overlay,
+    SummaryInputs,
     summary_page,
 )
 from vermilion.storage.files import atomic_path
@@ -35,7 +35,7 @@ def main(snakemake):
     def named(kind, paths):
         return [(name, Path(path)) for name, path in zip(names[kind], paths, strict=True)]
 
-    found = Findings(
+    found = SummaryInputs(
         measures=read_table(inputs.measures),
         table1=read_table(inputs.table1),
         kinds=read_table(inputs.kinds),

@@ -6,12 +6,13 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import write_cameras
 from vermilion.storage.logfile import log_to
 from vermilion.studio.capture_writer import write_labels, write_truth
-from vermilion.studio.take import cameras_of, plan_of
+from vermilion.studio.take import cameras_of, plan_take
+from vermilion.studio.take_settings import take_settings
 
 if __name__ == "__main__":
     log_to(snakemake.log[0])
     cfg = snakemake.params.cfg
-    plan = plan_of(FaceModel.load(snakemake.input.model), **cfg["plan"])
+    plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     cameras = cameras_of(plan, cfg["plan"]["role"], **cfg["cameras"])
     folder = Path(snakemake.output.cameras[0]).parent
     write_cameras(folder, cameras)

@@ -6,12 +6,13 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.storage.logfile import log_to
 from vermilion.studio.capture_writer import write_images
-from vermilion.studio.take import plan_of
+from vermilion.studio.take import plan_take
+from vermilion.studio.take_settings import take_settings
 
 if __name__ == "__main__":
     log_to(snakemake.log[0])
     cfg = snakemake.params.cfg
-    plan = plan_of(FaceModel.load(snakemake.input.model), **cfg["plan"])
+    plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     folder = Path(snakemake.input.cameras[0]).parent
     images = cfg["images"]
     write_images(

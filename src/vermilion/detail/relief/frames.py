@@ -20,7 +20,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
-from vermilion.storage.sequences import locate, read_sequence
+from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake
 
 
@@ -49,7 +49,7 @@ class Scene:
             place: subject and take; span: first and last frame whose meshes are read.
         """
         camera, frames = TrackedTake.load(inputs.fit).camera, open_frames(source, *place)
-        places = locate(inputs.meshes, range(span[0], span[1] + 1))
+        places = rows_of_frames(inputs.meshes, range(span[0], span[1] + 1))
 
         def read_mesh(frame):
             path, row = places[frame]
@@ -126,7 +126,7 @@ class ReliefReader:
 
     def __init__(self, paths: Sequence[str | Path], frames: Sequence[int]):
         """`paths` of chunks `<first>-<last>.npz`; `frames` that may be asked for."""
-        self._places, self._open = locate(paths, frames), {}
+        self._places, self._open = rows_of_frames(paths, frames), {}
 
     def _at(self, frame: int):
         path, row = self._places[frame]

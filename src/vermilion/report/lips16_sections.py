@@ -16,7 +16,7 @@ _LACKING = (
 )
 
 
-def answers(
+def comparison_section(
     comparisons: pd.DataFrame, estimators: pd.DataFrame, table1: pd.DataFrame, configured: str
 ) -> str:
     """What is better than what, by more than the interval over clips, or not."""
@@ -37,7 +37,7 @@ def answers(
     )
 
 
-def features(table2: pd.DataFrame, table3: pd.DataFrame) -> str:
+def feature_section(table2: pd.DataFrame, table3: pd.DataFrame) -> str:
     """Lips16 tables 2 and 3."""
     if table2["features"].nunique() < 2:
         return _LACKING
@@ -60,7 +60,7 @@ def features(table2: pd.DataFrame, table3: pd.DataFrame) -> str:
     )
 
 
-def strategies(estimators: pd.DataFrame) -> str:
+def estimator_section(estimators: pd.DataFrame) -> str:
     """Estimators with their best parameters."""
     several = estimators.groupby("regressor")["estimator"].transform("nunique") > 1
     if not several.any():
@@ -79,7 +79,7 @@ def strategies(estimators: pd.DataFrame) -> str:
     return note + page.table(shown, headings, "regressor")
 
 
-def kinds(table: pd.DataFrame) -> str:
+def kinds_section(table: pd.DataFrame) -> str:
     """Errors by kind of mouth shape."""
     rows = table[table["region"] == "mouth"].reset_index(drop=True)
     if rows.empty:
