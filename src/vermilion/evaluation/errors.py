@@ -135,20 +135,12 @@ def sums_of_jitter(
     excess = second_differences(aligned_mm, frames) - second_differences(
         reference.points_mm, frames
     )
-    sums = {}
-    for region, weights in regions.weights.items():
-        weight, jitter = weighted_sums(excess, weights, clips)
-        sums[f"{region}.jitter_weight"], sums[f"{region}.jitter"] = weight, jitter
-    return ClipSums(sums)
+    return _sums_by_region("jitter", excess, regions, clips)
 
 
 def sums_of_drift(drift_mm: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
     """Sums behind `drift_mm`, of drift_mm (F, V), by clips (F,); NaN does not count."""
-    sums = {}
-    for region, weights in regions.weights.items():
-        weight, total = weighted_sums(drift_mm, weights, clips)
-        sums[f"{region}.drift_weight"], sums[f"{region}.drift"] = weight, total
-    return ClipSums(sums)
+    return _sums_by_region("drift", drift_mm, regions, clips)
 
 
 def sums_of_aperture(
@@ -197,7 +189,7 @@ def gaps_in_head(
     return lip_gaps(np.matmul(points_mm, head_rotations.transpose(0, 2, 1)), sides, columns)
 
 
-def sums_of_moving_errors(
+def sums_of_motion_errors(
     sequence_mm: np.ndarray,
     reference: Reference,
     head_rotations: np.ndarray,
@@ -217,12 +209,7 @@ def sums_of_moving_errors(
     offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
     known = np.isfinite(offset)
     mean = np.where(known, offset, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    moving = np.linalg.norm(offset - mean, axis=2)
-    sums = {}
-    for region, weights in regions.weights.items():
-        weight, error = weighted_sums(moving, weights, clips)
-        sums[f"{region}.moving_weight"], sums[f"{region}.moving"] = weight, error
-    return ClipSums(sums)
+    return _sums_by_region("moving", np.linalg.norm(offset - mean, axis=2), regions, clips)
 
 
 def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
@@ -234,6 +221,15 @@ def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums
             name: by_clip(np.where(known, values, 0.0), clips),
         }
     )
+
+
+def _sums_by_region(name: str, values: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
+    """Sums of values (F, V) and of the weights of those known, by region and clip (F,)."""
+    sums = {}
+    for region, weights in regions.weights.items():
+        known, total = weighted_sums(values, weights, clips)
+        sums[f"{region}.{name}_weight"], sums[f"{region}.{name}"] = known, total
+    return ClipSums(sums)
 
 
 def by_clip(values: np.ndarray, clips: np.ndarray, combine: np.ufunc = np.add) -> np.ndarray:

@@ -17,7 +17,7 @@ from vermilion.evaluation.errors import (
     sums_of_errors,
     sums_of_frames,
     sums_of_jitter,
-    sums_of_moving_errors,
+    sums_of_motion_errors,
     surface_errors,
     vertex_errors,
 )
@@ -111,7 +111,7 @@ def evaluate_take(
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
-            + sums_of_moving_errors(sequence, reference, head.rotations, regions, clips)
+            + sums_of_motion_errors(sequence, reference, head.rotations, regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)

@@ -18,7 +18,9 @@ from vermilion.multiview.take import Refiner
 from vermilion.multiview.views import Frame
 
 
-def with_points_of(first: Refiner, take: str, frame: Frame, own: Neutral) -> tuple[Neutral, str]:
+def register_to_first_take(
+    first: Refiner, take: str, frame: Frame, own: Neutral
+) -> tuple[Neutral, str]:
     """A later take's neutral on the points of the skin that the first take's vertices mark.
 
     Args:

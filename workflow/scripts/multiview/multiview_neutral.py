@@ -15,7 +15,7 @@ from vermilion.multiview.files import read_neutral, read_views, write_neutral
 from vermilion.multiview.neutral import NeutralSettings, register_neutral
 from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.register_to_first_take import with_points_of
+from vermilion.multiview.register_to_first_take import register_to_first_take
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
@@ -60,7 +60,7 @@ def main(snakemake):
     if snakemake.params.first:
         first = refiner_of_first_take(snakemake, image_settings, stereo, model)
         name = snakemake.params.first["take"]
-        found, why = with_points_of(first, name, frame, found)
+        found, why = register_to_first_take(first, name, frame, found)
         if why:
             print(
                 f"WARNING: {subject}/{take}: found {why} between its neutral and that of {name}; "
