@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ManifestConfig(StageConfig):
@@ -207,12 +207,8 @@ class CaptureConfig(StageConfig):
         description="Camera of a multi-view take that stands for the monocular video; the world of a "
         "rig calibrated here is its frame.",
     )
-    manifest: ManifestConfig = Field(
-        default_factory=ManifestConfig, description="What is recorded of the images."
+    manifest: ManifestConfig = section(ManifestConfig, "What is recorded of the images.")
+    calibration: CalibrationConfig = section(
+        CalibrationConfig, "Calibration from images of a board."
     )
-    calibration: CalibrationConfig = Field(
-        default_factory=CalibrationConfig, description="Calibration from images of a board."
-    )
-    refinement: RefinementConfig = Field(
-        default_factory=RefinementConfig, description="Refinement of the cameras' poses."
-    )
+    refinement: RefinementConfig = section(RefinementConfig, "Refinement of the cameras' poses.")

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class BoostingConfig(StageConfig):
@@ -144,12 +144,8 @@ class ContourDetectorConfig(StageConfig):
         description="`track`, `landmarks`: cost of a slope of 1 between the border and where it is looked "
         "for.",
     )
-    track: TrackRidgeConfig = Field(
-        default_factory=TrackRidgeConfig, description="Ridges near the tracked lips."
-    )
-    boosting: BoostingConfig = Field(
-        default_factory=BoostingConfig, description="Boosted trees of the detectors."
-    )
+    track: TrackRidgeConfig = section(TrackRidgeConfig, "Ridges near the tracked lips.")
+    boosting: BoostingConfig = section(BoostingConfig, "Boosted trees of the detectors.")
     seed: int = Field(0, ge=0, description="Seed of the random features and samples.")
 
 
@@ -170,9 +166,5 @@ class ContourMapsConfig(StageConfig):
 class ContoursConfig(StageConfig):
     """Lip contour likelihood maps."""
 
-    detector: ContourDetectorConfig = Field(
-        default_factory=ContourDetectorConfig, description="How contours are found."
-    )
-    maps: ContourMapsConfig = Field(
-        default_factory=ContourMapsConfig, description="Maps of every frame."
-    )
+    detector: ContourDetectorConfig = section(ContourDetectorConfig, "How contours are found.")
+    maps: ContourMapsConfig = section(ContourMapsConfig, "Maps of every frame.")

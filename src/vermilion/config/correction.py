@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class LayersConfig(StageConfig):
@@ -119,13 +119,9 @@ class ImageAgreementConfig(StageConfig):
 class CorrectionConfig(StageConfig):
     """The correction layer (Lips16 4.2)."""
 
-    layers: LayersConfig = Field(default_factory=LayersConfig, description="Making layers.")
-    integration: IntegrationConfig = Field(
-        default_factory=IntegrationConfig, description="Applying layers."
-    )
-    image: ImageAgreementConfig = Field(
-        default_factory=ImageAgreementConfig, description="Agreeing with the image."
-    )
+    layers: LayersConfig = section(LayersConfig, "Making layers.")
+    integration: IntegrationConfig = section(IntegrationConfig, "Applying layers.")
+    image: ImageAgreementConfig = section(ImageAgreementConfig, "Agreeing with the image.")
     neutral_frames: dict[str, int] = Field(
         default_factory=dict,
         description="Videos with a frame of the neutral that the person's rig takes begin with (mouth "
@@ -134,4 +130,4 @@ class CorrectionConfig(StageConfig):
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""
-        return self.image.reach_frames + self.integration.at(fps)["smooth_frames"]
+        return self.image.reach_frames + int(self.integration.at(fps)["smooth_frames"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, field_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class FlowEnergyConfig(StageConfig):
@@ -147,15 +147,11 @@ class DetailConfig(StageConfig):
         le=4096,
         description="A larger face is reduced to this for the flow (longer side, pixels).",
     )
-    flow: FlowEnergyConfig = Field(
-        default_factory=FlowEnergyConfig, description="The corrective flow (Mono13 7.1)."
+    flow: FlowEnergyConfig = section(FlowEnergyConfig, "The corrective flow (Mono13 7.1).")
+    deformation: DeformationConfig = section(
+        DeformationConfig, "The mesh after the flow (Mono13 7.2)."
     )
-    deformation: DeformationConfig = Field(
-        default_factory=DeformationConfig, description="The mesh after the flow (Mono13 7.2)."
-    )
-    relief: ReliefConfig = Field(
-        default_factory=ReliefConfig, description="Fine relief from shading (Mono13 8)."
-    )
+    relief: ReliefConfig = section(ReliefConfig, "Fine relief from shading (Mono13 8).")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ReferenceConfig(StageConfig):
@@ -121,9 +121,7 @@ class EvaluationConfig(StageConfig):
         "inside; read by the evaluation alone. Empty: the studio's truth for the takes that the "
         "studio made, and the held-out reconstruction H for the others.",
     )
-    reference: ReferenceConfig = Field(
-        default_factory=ReferenceConfig, description="How a vertex finds its counterpart."
-    )
+    reference: ReferenceConfig = section(ReferenceConfig, "How a vertex finds its counterpart.")
     variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only", "paper"]] = (
         Field(
             [],
@@ -134,12 +132,6 @@ class EvaluationConfig(StageConfig):
     variants_of: list[Literal["PS", "MS", "GR"]] = Field(
         ["PS", "MS", "GR"], description="Regressors that the variants are made of."
     )
-    contour: ContourConfig = Field(
-        default_factory=ContourConfig, description="The contour baseline (Lips16 section 6)."
-    )
-    measures: MeasuresConfig = Field(
-        default_factory=MeasuresConfig, description="Figures and their intervals."
-    )
-    figures: FiguresConfig = Field(
-        default_factory=FiguresConfig, description="Images of the report."
-    )
+    contour: ContourConfig = section(ContourConfig, "The contour baseline (Lips16 section 6).")
+    measures: MeasuresConfig = section(MeasuresConfig, "Figures and their intervals.")
+    figures: FiguresConfig = section(FiguresConfig, "Images of the report.")

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ShapeFeaturesConfig(StageConfig):
@@ -77,9 +77,7 @@ class ContourFeaturesConfig(StageConfig):
 class FeaturesConfig(StageConfig):
     """The regressor's input."""
 
-    shape: ShapeFeaturesConfig = Field(
-        default_factory=ShapeFeaturesConfig, description="Shape coefficients of the coarse mesh."
+    shape: ShapeFeaturesConfig = section(
+        ShapeFeaturesConfig, "Shape coefficients of the coarse mesh."
     )
-    contours: ContourFeaturesConfig = Field(
-        default_factory=ContourFeaturesConfig, description="Relative contour distances."
-    )
+    contours: ContourFeaturesConfig = section(ContourFeaturesConfig, "Relative contour distances.")

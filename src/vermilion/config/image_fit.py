@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 Counts = Annotated[list[Annotated[int, Field(ge=0, le=50)]], Field(min_length=1, max_length=6)]
 
@@ -115,13 +115,9 @@ class ImageFitConfig(StageConfig):
         True,
         description="Fit pose and expression to the images; off: the landmark fit is the track.",
     )
-    appearance: AppearanceConfig = Field(
-        default_factory=AppearanceConfig, description="Lighting and albedo."
-    )
-    frame_fit: FrameFitConfig = Field(
-        default_factory=FrameFitConfig, description="Pose and expression of one frame."
-    )
-    join: JoinConfig = Field(default_factory=JoinConfig, description="The frames as one track.")
+    appearance: AppearanceConfig = section(AppearanceConfig, "Lighting and albedo.")
+    frame_fit: FrameFitConfig = section(FrameFitConfig, "Pose and expression of one frame.")
+    join: JoinConfig = section(JoinConfig, "The frames as one track.")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

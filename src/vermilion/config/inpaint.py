@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class DomainConfig(StageConfig):
@@ -166,16 +166,10 @@ class CompositeConfig(StageConfig):
 class InpaintConfig(StageConfig):
     """Removal of the lip tattoo (Lips16 3.2.1)."""
 
-    domain: DomainConfig = Field(
-        default_factory=DomainConfig, description="The patch of the lips in texture space."
-    )
-    mask: MaskConfig = Field(default_factory=MaskConfig, description="Where the tattoo is.")
-    shading: ShadingConfig = Field(
-        default_factory=ShadingConfig, description="How shading is carried over."
-    )
-    opening: OpeningConfig = Field(
-        default_factory=OpeningConfig, description="Where the mouth opens."
-    )
-    composite: CompositeConfig = Field(
-        default_factory=CompositeConfig, description="How the texture is rendered into a frame."
+    domain: DomainConfig = section(DomainConfig, "The patch of the lips in texture space.")
+    mask: MaskConfig = section(MaskConfig, "Where the tattoo is.")
+    shading: ShadingConfig = section(ShadingConfig, "How shading is carried over.")
+    opening: OpeningConfig = section(OpeningConfig, "Where the mouth opens.")
+    composite: CompositeConfig = section(
+        CompositeConfig, "How the texture is rendered into a frame."
     )

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class NetworksConfig(StageConfig):
@@ -103,9 +103,9 @@ class KeyFramesConfig(StageConfig):
         le=100_000,
         description="Longer clips between key frames are divided (frames).",
     )
-    csv: LandmarkFilesConfig = Field(
-        default_factory=LandmarkFilesConfig,
-        description="Landmarks of another tracker, frame by frame, that count as key frames where "
+    csv: LandmarkFilesConfig = section(
+        LandmarkFilesConfig,
+        "Landmarks of another tracker, frame by frame, that count as key frames where "
         "the file exists and the tracker was sure.",
     )
 
@@ -161,20 +161,12 @@ class LandmarksConfig(StageConfig):
         default_factory=list,
         description="`trained` only: takes (subject/take) whose captures hold labels/landmarks/.",
     )
-    networks: NetworksConfig = Field(
-        default_factory=NetworksConfig, description="The ONNX networks."
-    )
-    csv: LandmarkFilesConfig = Field(
-        default_factory=LandmarkFilesConfig, description="Files of another tracker."
-    )
-    training: LandmarkTrainingConfig = Field(
-        default_factory=LandmarkTrainingConfig, description="The embedded regressor."
-    )
-    key_frames: KeyFramesConfig = Field(
-        default_factory=KeyFramesConfig, description="Frames whose landmarks are trusted."
-    )
-    correction: LandmarkCorrectionConfig = Field(
-        default_factory=LandmarkCorrectionConfig, description="Correction by flow between them."
+    networks: NetworksConfig = section(NetworksConfig, "The ONNX networks.")
+    csv: LandmarkFilesConfig = section(LandmarkFilesConfig, "Files of another tracker.")
+    training: LandmarkTrainingConfig = section(LandmarkTrainingConfig, "The embedded regressor.")
+    key_frames: KeyFramesConfig = section(KeyFramesConfig, "Frames whose landmarks are trusted.")
+    correction: LandmarkCorrectionConfig = section(
+        LandmarkCorrectionConfig, "Correction by flow between them."
     )
 
     @model_validator(mode="after")

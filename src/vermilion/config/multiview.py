@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ImageConfig(StageConfig):
@@ -258,23 +258,13 @@ class ReportConfig(StageConfig):
 class MultiviewConfig(StageConfig):
     """From calibrated cameras to **H**, the registered high-quality mesh sequence."""
 
-    images: ImageConfig = Field(default_factory=ImageConfig, description="Preparation of images.")
-    stereo: StereoConfig = Field(default_factory=StereoConfig, description="Dense matching.")
-    neutral: NeutralConfig = Field(
-        default_factory=NeutralConfig, description="Template to the neutral frame."
-    )
-    track: TrackConfig = Field(
-        default_factory=TrackConfig, description="Coarse track with anchor frames (Beeler 2011)."
-    )
-    refine: RefineConfig = Field(
-        default_factory=RefineConfig, description="Registration of each frame to the neutral."
-    )
-    drift: DriftConfig = Field(
-        default_factory=DriftConfig, description="Drift of each frame against the neutral."
-    )
-    report: ReportConfig = Field(
-        default_factory=ReportConfig, description="The report page of a take."
-    )
+    images: ImageConfig = section(ImageConfig, "Preparation of images.")
+    stereo: StereoConfig = section(StereoConfig, "Dense matching.")
+    neutral: NeutralConfig = section(NeutralConfig, "Template to the neutral frame.")
+    track: TrackConfig = section(TrackConfig, "Coarse track with anchor frames (Beeler 2011).")
+    refine: RefineConfig = section(RefineConfig, "Registration of each frame to the neutral.")
+    drift: DriftConfig = section(DriftConfig, "Drift of each frame against the neutral.")
+    report: ReportConfig = section(ReportConfig, "The report page of a take.")
 
     @model_validator(mode="after")
     def _rounds_agree(self) -> MultiviewConfig:

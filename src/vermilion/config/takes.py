@@ -6,7 +6,7 @@ import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
@@ -116,7 +116,7 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
     if not value["source"]:
         wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
-    numbers = {}
+    numbers: dict[str, float] = {}
     for name, kind in (("first", int), ("last", int), ("fps", float)):
         try:
             numbers[name] = kind(value[name])
@@ -146,14 +146,17 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
                 )
     if wrong:
         return None, wrong
-    return Take(
+    take = Take(
         value["subject"],
         value["take"],
-        value["role"],
-        value["source"],  # type: ignore
-        split=split,
-        **numbers,
-    ), []
+        cast(Role, value["role"]),
+        value["source"],
+        int(numbers["first"]),
+        int(numbers["last"]),
+        numbers["fps"],
+        split,
+    )
+    return take, []
 
 
 def _check_together(takes: list[Take]) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 from vermilion.config.image_fit import ImageFitConfig, OffsetsConfig
 
 
@@ -33,9 +33,8 @@ class LandmarkBiases(StageConfig):
 class ModelFitConfig(StageConfig):
     """How much landmarks, and how much blend weights, are trusted."""
 
-    noise: LandmarkGroups = Field(
-        default_factory=LandmarkGroups,
-        description="Deviation of a detected landmark from one frame to another.",
+    noise: LandmarkGroups = section(
+        LandmarkGroups, "Deviation of a detected landmark from one frame to another."
     )
     robust_sigmas: float = Field(
         3.0, gt=0.5, le=100, description="A landmark this far off counts half (deviations)."
@@ -90,9 +89,9 @@ class IdentityConfig(StageConfig):
     frames: int = Field(
         16, ge=1, le=200, description="Frames of all takes together, evenly spread (count)."
     )
-    bias: LandmarkBiases = Field(
-        default_factory=LandmarkBiases,
-        description="Deviation of the person's landmarks, as the detector sees them, from the "
+    bias: LandmarkBiases = section(
+        LandmarkBiases,
+        "Deviation of the person's landmarks, as the detector sees them, from the "
         "model's, the same in all frames.",
     )
     neutral_weight_sigma: float = Field(
@@ -108,8 +107,8 @@ class IdentityConfig(StageConfig):
         le=2,
         description="Deviation of the logarithm of an unknown focal length about the assumed one.",
     )
-    images: IdentityImagesConfig = Field(
-        default_factory=IdentityImagesConfig, description="The person from the images as well."
+    images: IdentityImagesConfig = section(
+        IdentityImagesConfig, "The person from the images as well."
     )
 
 
@@ -194,23 +193,15 @@ class ScanConfig(StageConfig):
 class TrackingConfig(StageConfig):
     """The coarse monocular track (Lips16 3.2, Mono13 6)."""
 
-    fit: ModelFitConfig = Field(
-        default_factory=ModelFitConfig, description="Trust in landmarks and blend weights."
-    )
-    identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
-    motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
-    image_fit: ImageFitConfig = Field(
-        default_factory=ImageFitConfig, description="Pose and expression from the images."
-    )
-    offsets: OffsetsConfig = Field(
-        default_factory=OffsetsConfig, description="Offsets outside the model's space."
-    )
-    meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")
+    fit: ModelFitConfig = section(ModelFitConfig, "Trust in landmarks and blend weights.")
+    identity: IdentityConfig = section(IdentityConfig, "The person.")
+    motion: MotionConfig = section(MotionConfig, "Pose and expression.")
+    image_fit: ImageFitConfig = section(ImageFitConfig, "Pose and expression from the images.")
+    offsets: OffsetsConfig = section(OffsetsConfig, "Offsets outside the model's space.")
+    meshes: MeshesConfig = section(MeshesConfig, "Meshes and overlays.")
     scans: dict[str, ScanConfig] = Field(
         default_factory=dict,
         description="Subject -> scan, for those whose face model comes from one; the others' comes "
         "from the identity that their takes show.",
     )
-    external: ExternalConfig = Field(
-        default_factory=ExternalConfig, description="Mesh sequences of other trackers."
-    )
+    external: ExternalConfig = section(ExternalConfig, "Mesh sequences of other trackers.")
