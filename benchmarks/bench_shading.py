@@ -20,7 +20,7 @@ from tests.unit import test_shading_refinement as scenes
 from vermilion.detail.relief import combine as combination
 from vermilion.detail.relief import relief
 from vermilion.detail.relief import short_range as detail
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.geometry.mesh import triangle_normals, vertex_normals
 
 SIDE = 161
@@ -43,7 +43,7 @@ def main() -> None:
     grain = np.random.default_rng(0).normal(size=(n, 1))
     shown = triangle_normals(moved, topology.skin) @ scenes.FACING.T
     smooth = triangle_normals(points, topology.skin) @ scenes.FACING.T
-    sight = Sight(light.values(shown) + grain, np.ones(n), smooth)
+    observed = SkinObservation(light.values(shown) + grain, np.ones(n), smooth)
     settings = relief.ReliefSettings(detail_mm=20.0)
     near = np.hypot(points[:, 0] - 5, points[:, 1]) < 12
     ours, seconds = relief.CholeskyFactor, {}
@@ -51,10 +51,10 @@ def main() -> None:
         for module in (relief, detail, combination):
             module.CholeskyFactor = factor
         start = time.process_time()
-        found = relief.solve_relief(points, scenes.FACING, sight, light, topology, settings)
+        found = relief.solve_relief(points, scenes.FACING, observed, light, topology, settings)
         middle = time.process_time()
         after = vertex_normals(points + found[:, None] * normals, topology.skin)
-        combination.combine(points, normals, after, topology, 0.1, found)
+        combination.combine_positions_and_normals(points, normals, after, topology, 0.1, found)
         seconds[name] = middle - start, time.process_time() - middle
         print(f"{name}: relief {seconds[name][0]:.2f} s, combination {seconds[name][1]:.2f} s")
     before_deg = scenes.degrees_apart(normals, true)[near].mean()

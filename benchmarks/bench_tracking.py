@@ -35,13 +35,13 @@ from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import focal_px
-from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
+from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.settings import landmark_fit_settings
 
 _ROUNDS = 60
 
@@ -126,14 +126,14 @@ def speed(folder: Path, model: FaceModel, person: Identity, source: str, fps: fl
     fit = TrackedTake.load(path if path.exists() else folder / "fit.npz")
     track = LandmarkTrack.load(sorted((folder.parent / "landmarks").glob("*.npz")))
     options = TrackingConfig().model_dump(mode="json")
-    settings = fit_settings(options["fit"], options["motion"])
+    settings = landmark_fit_settings(options["fit"], options["motion"])
     start = TakeStart.of(model, person, fit, track, settings)
     appearance = Appearance.load(folder / "appearance.npz")
     face = start.face(appearance.samples)
-    photometric = PhotometricSettings(**options["image_fit"]["frame_fit"])
+    photometric = FrameFitSettings(**options["image_fit"]["frame_fit"])
     problem = FrameProblem(face, appearance, photometric, settings.weight_sigma)
-    bending = LayerSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
-    layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
+    bending = OffsetSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
+    layer = OffsetSolver(model, person.neutral_mm, face, appearance, bending)
     frames, levels = open_frames(source), len(photometric.iterations)
     rows = np.unique(np.linspace(0, len(fit.frames) - 1, count).round().astype(int))
     began = time.process_time()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion
+from tests.unit.image_fit_scene import CAMERA, dome, image_of, mesh_of, motion
 from vermilion.appearance.samples import sample_skin
 from vermilion.tracking.identity.joint_identity import (
     IdentityImageSettings,
@@ -18,7 +18,7 @@ from vermilion.tracking.identity.landmark_identity import (
     TakeSample,
 )
 from vermilion.tracking.image_fit.residual import photometric_residual
-from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, focal_px
 
 PERSON = np.array([1.3, -1.0])
@@ -50,7 +50,8 @@ def scene(noise_px=3.0):
     sample = TakeSample("t", seen, focal_px(CAMERA), True, np.arange(N_FRAMES) == 0)
     loose = LandmarkNoise(0.05, 0.05, 0.05, 0.05, 0.05)
     settings = IdentitySettings(
-        fit=FitSettings(noise=loose, jaw_slide=1.0), bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2)
+        fit=LandmarkFitSettings(noise=loose, jaw_slide=1.0),
+        bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2),
     )
     images = [image_of(model, mesh) for mesh in meshes]
     return model, IdentityProblem(model, [sample], settings), images

@@ -26,7 +26,7 @@ _ROBUST = 12.0
 
 
 @dataclass(frozen=True)
-class Sightings:
+class SampleObservations:
     """What M frames show at N samples at L resolutions.
 
     Attributes:
@@ -80,7 +80,7 @@ class Appearance:
 
 
 def estimate_appearance(
-    frames: np.ndarray, samples: SurfaceSamples, seen: Sightings, albedo_prior: float
+    frames: np.ndarray, samples: SurfaceSamples, seen: SampleObservations, albedo_prior: float
 ) -> Appearance:
     """Light and albedo from sightings of some frames.
 
@@ -90,11 +90,11 @@ def estimate_appearance(
     """
     finest, trust = seen.colours[:, 0], seen.trust
     basis = harmonics(seen.normals)
-    skin = middle_colour(finest, trust)
+    skin = median_colour(finest, trust)
     light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
     for _ in range(_ROUNDS):
         shading = irradiance(seen.normals, light)
-        skin = middle_colour(finest / shading, trust)
+        skin = median_colour(finest / shading, trust)
         albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
     # No image tells a bright light on dark skin from a dim one on fair skin, nor their colours:
@@ -102,7 +102,7 @@ def estimate_appearance(
     weight = trust / max(trust.sum(), 1e-12)
     mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
     light = light / mean
-    skin = middle_colour(finest / irradiance(seen.normals, light), trust)
+    skin = median_colour(finest / irradiance(seen.normals, light), trust)
     light = light * (skin.mean() / SKIN_ALBEDO)
     skin = skin * (SKIN_ALBEDO / skin.mean())
     shading = irradiance(seen.normals, light)
@@ -120,7 +120,7 @@ def estimate_appearance(
     )
 
 
-def middle_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
+def median_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
     """Median colour (3,) of what is well seen."""
     return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
 

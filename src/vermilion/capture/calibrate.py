@@ -10,7 +10,12 @@ import numpy as np
 import pycolmap
 
 from vermilion.capture.board import Board
-from vermilion.capture.bundle_adjust import Observations, RigEstimate, adjust_rig, reprojection
+from vermilion.capture.bundle_adjust_board import (
+    BoardViews,
+    RigEstimate,
+    bundle_adjust_board,
+    reprojection,
+)
 from vermilion.geometry.camera import Camera
 from vermilion.storage.errors import InputError
 
@@ -41,7 +46,7 @@ class Calibration:
 
 def calibrate_rig(
     board: Board,
-    seen: Observations,
+    seen: BoardViews,
     sizes: dict[str, tuple[int, int]],
     reference: str,
     model: str = "OPENCV",
@@ -70,7 +75,7 @@ def calibrate_rig(
             views, corners, sizes[name], model, refine_principal_point
         )
     estimate = _join(cameras, boards, reference, place)
-    estimate = adjust_rig(estimate, reference, seen, corners, refine_principal_point)
+    estimate = bundle_adjust_board(estimate, reference, seen, corners, refine_principal_point)
     bad = {key for key, rms in _view_rms(estimate, seen, corners).items() if rms > max_view_px}
     if bad:
         dropped += sorted(bad)
@@ -82,11 +87,11 @@ def calibrate_rig(
         moments = {m for views in seen.values() for m in views}
         kept = {m: p for m, p in estimate.rig_from_board.items() if m in moments}
         estimate = RigEstimate(estimate.cameras, estimate.camera_from_rig, kept)
-        estimate = adjust_rig(estimate, reference, seen, corners, refine_principal_point)
+        estimate = bundle_adjust_board(estimate, reference, seen, corners, refine_principal_point)
     return _calibration(estimate, seen, corners, tuple(dropped))
 
 
-def _usable(seen: Observations) -> tuple[Observations, list[tuple[str, str]]]:
+def _usable(seen: BoardViews) -> tuple[BoardViews, list[tuple[str, str]]]:
     dropped = [(c, m) for c, views in seen.items() for m, v in views.items() if len(v.ids) < 6]
     kept = {
         c: {m: v for m, v in sorted(views.items()) if len(v.ids) >= 6} for c, views in seen.items()
@@ -94,7 +99,7 @@ def _usable(seen: Observations) -> tuple[Observations, list[tuple[str, str]]]:
     return kept, sorted(dropped)
 
 
-def _check_enough(seen: Observations, sizes: dict[str, tuple[int, int]], place: dict) -> None:
+def _check_enough(seen: BoardViews, sizes: dict[str, tuple[int, int]], place: dict) -> None:
     few = {name: len(seen.get(name, {})) for name in sizes if len(seen.get(name, {})) < MIN_VIEWS}
     if few:
         listing = ", ".join(f"{name} {count}" for name, count in sorted(few.items()))
@@ -188,7 +193,7 @@ def _inverse(pose: np.ndarray) -> np.ndarray:
 
 
 def _view_rms(
-    estimate: RigEstimate, seen: Observations, corners: np.ndarray
+    estimate: RigEstimate, seen: BoardViews, corners: np.ndarray
 ) -> dict[tuple[str, str], float]:
     return {
         (name, moment): _rms(
@@ -205,7 +210,7 @@ def _rms(differences: np.ndarray) -> float:
 
 def _calibration(
     estimate: RigEstimate,
-    seen: Observations,
+    seen: BoardViews,
     corners: np.ndarray,
     dropped: tuple[tuple[str, str], ...],
 ) -> Calibration:

@@ -60,7 +60,7 @@ def refinement_sheet(
 
     Args:
         images: camera -> linear image, or None.
-        shown, moved: of a `Refinement`.
+        shown, moved: of a `RigRefinement`.
     """
     tiles = []
     for name, linear in images.items():

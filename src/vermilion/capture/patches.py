@@ -1,4 +1,4 @@
-"""Observations of a track to a small part of a pixel: least-squares matching of surface patches.
+"""BoardViews of a track to a small part of a pixel: least-squares matching of surface patches.
 
 A feature detector places a point in each image by itself, a quarter of a pixel off. Here the patch
 round a point in one image is laid on the tangent plane of the surface, projected into each other

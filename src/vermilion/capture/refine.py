@@ -1,4 +1,4 @@
-"""Refinement of a rig whose calibration is off, from the images of the take themselves.
+"""RigRefinement of a rig whose calibration is off, from the images of the take themselves.
 
 Features are matched near the epipolar lines of the given poses, the poses adjusted over their
 tracks, and the matching repeated with the better poses. Patches of the surface round the points,
@@ -15,13 +15,18 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from vermilion.capture.bundle_adjust_poses import adjust, lay_onto, midpoints, residuals_px
+from vermilion.capture.bundle_adjust import (
+    align_to_given,
+    bundle_adjust,
+    residuals_px,
+    triangulate_tracks,
+)
 from vermilion.capture.patches import Greys, align_patches
 from vermilion.capture.tracks import (
+    FeatureMatchSettings,
     Features,
-    MatchSettings,
     Tracks,
-    join_tracks,
+    concatenate_tracks,
     match_frame,
 )
 from vermilion.geometry.camera import Camera
@@ -30,11 +35,11 @@ MultiviewImages = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its
 
 
 @dataclass(frozen=True)
-class RefineSettings:
+class RigRefinementSettings:
     """How a rig is refined.
 
     Attributes:
-        fine_gate_deg: as `MatchSettings.gate_deg`, once the poses are better.
+        fine_gate_deg: as `FeatureMatchSettings.gate_deg`, once the poses are better.
         max_residual_px: observations that lie farther from their point at the end are outliers.
         loss_px: residual at which the robust loss turns from squared to linear.
         patch_radius_px: half the width of the patches that are matched last; 0 for none.
@@ -45,7 +50,7 @@ class RefineSettings:
         threshold_px: given cameras whose median error is below are left alone.
         improvement: largest ratio of the held-out median errors, refined over given, at which the
             refined cameras are taken.
-        turn_deg, shift_mm: expected error of a given pose (see `lay_onto`).
+        turn_deg, shift_mm: expected error of a given pose (see `align_to_given`).
         refine_focal: adjust focal lengths too.
     """
 
@@ -66,7 +71,7 @@ class RefineSettings:
 
 
 @dataclass(frozen=True)
-class Refinement:
+class RigRefinement:
     """What became of a rig.
 
     Attributes:
@@ -106,10 +111,10 @@ class Refinement:
 def refine_cameras(
     given: Mapping[str, Camera],
     images: MultiviewImages,
-    matching: MatchSettings,
-    settings: RefineSettings,
+    matching: FeatureMatchSettings,
+    settings: RigRefinementSettings,
     only_if_off: bool = True,
-) -> Refinement:
+) -> RigRefinement:
     """Adjust the poses of a rig to what its images show.
 
     The world stays: the refined rig is turned, shifted and scaled onto the given poses.
@@ -125,7 +130,7 @@ def refine_cameras(
     found = _match(given, images, matching)
     if found.count < settings.min_tracks:
         reason = f"{found.count} tracks; at least {settings.min_tracks} are needed"
-        return Refinement(given, False, reason, {"found": found.count})
+        return RigRefinement(given, False, reason, {"found": found.count})
     held, fitted = _split(found, settings.held_out, matching.seed)
     expected, before = _measured(given, held, settings)
     tracks = {"found": found.count, "held_out": held.count}
@@ -135,7 +140,7 @@ def refine_cameras(
             f"{settings.threshold_px:g} px"
         )
         shown = _shown(held, expected, None)
-        return Refinement(given, False, reason, tracks, before, None, shown=shown)
+        return RigRefinement(given, False, reason, tracks, before, None, shown=shown)
     rough, _ = _solve(given, fitted, given, settings)
     near = replace(matching, gate_deg=settings.fine_gate_deg)
     again = _match(rough, _without(images, held), near)
@@ -147,8 +152,8 @@ def refine_cameras(
     tracks["adjusted"] = used.count
     if used.count < settings.min_tracks or len(enough) < 2:
         reason = f"{used.count} consistent tracks; at least {settings.min_tracks} are needed"
-        return Refinement(given, False, reason, tracks, before)
-    laid = lay_onto(
+        return RigRefinement(given, False, reason, tracks, before)
+    laid = align_to_given(
         {n: given[n] for n in enough},
         {n: cameras[n] for n in enough},
         settings.turn_deg,
@@ -167,16 +172,18 @@ def refine_cameras(
     change += f"{after['median']:.2f} px refined"
     if after["median"] > settings.improvement * before["median"]:
         reason = f"no clear gain: {change}"
-        return Refinement(given, False, reason, tracks, before, after, shown=shown)
+        return RigRefinement(given, False, reason, tracks, before, after, shown=shown)
     left = sorted(set(given) - set(enough))
     if left:
         change += f"; too few tracks in {', '.join(left)}, kept as given"
-    return Refinement(cameras, True, change, tracks, before, after, moved, shown)
+    return RigRefinement(cameras, True, change, tracks, before, after, moved, shown)
 
 
-def _match(cameras: dict[str, Camera], images: MultiviewImages, matching: MatchSettings) -> Tracks:
+def _match(
+    cameras: dict[str, Camera], images: MultiviewImages, matching: FeatureMatchSettings
+) -> Tracks:
     frames = sorted(images)
-    return join_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
+    return concatenate_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
 
 
 def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
@@ -204,22 +211,22 @@ def _solve(
     cameras: dict[str, Camera],
     tracks: Tracks,
     given: dict[str, Camera],
-    settings: RefineSettings,
+    settings: RigRefinementSettings,
     rounds: int = 8,
 ) -> tuple[dict[str, Camera], Tracks]:
     """Poses over the tracks that agree: outliers leave in rounds, at thrice the median."""
     centres = {name: camera.centre_mm for name, camera in given.items()}
-    points = midpoints(cameras, tracks)
+    points = triangulate_tracks(cameras, tracks)
     for _ in range(rounds):
         distance = residuals_px(cameras, tracks, points)
         limit = max(settings.max_residual_px, 3 * float(np.median(distance)))
         tracks = tracks.kept(distance < limit)
         if tracks.count < 10:
             break
-        cameras, points = adjust(
+        cameras, points = bundle_adjust(
             cameras,
             tracks,
-            midpoints(cameras, tracks),
+            triangulate_tracks(cameras, tracks),
             free_poses=True,
             free_focal=settings.refine_focal,
             loss_px=settings.loss_px,
@@ -244,7 +251,7 @@ def _solve_patches(
     tracks: Tracks,
     given: dict[str, Camera],
     greys: Greys,
-    settings: RefineSettings,
+    settings: RigRefinementSettings,
 ) -> tuple[dict[str, Camera], Tracks]:
     """Poses over the patches of tracks; the poses and tracks as they were where few agree."""
     aligned = _aligned(cameras, tracks, greys, settings)
@@ -256,14 +263,14 @@ def _solve_patches(
     return _solve(cameras, aligned, given, fine)
 
 
-def _aligned(cameras, tracks: Tracks, greys: Greys, settings: RefineSettings) -> Tracks:
-    points = midpoints(cameras, tracks)
+def _aligned(cameras, tracks: Tracks, greys: Greys, settings: RigRefinementSettings) -> Tracks:
+    points = triangulate_tracks(cameras, tracks)
     return align_patches(cameras, tracks, points, greys, radius_px=settings.patch_radius_px)
 
 
-def _consistent(cameras, tracks: Tracks, settings: RefineSettings) -> Tracks:
+def _consistent(cameras, tracks: Tracks, settings: RigRefinementSettings) -> Tracks:
     """Tracks without the observations that are no match by any measure."""
-    distance = residuals_px(cameras, tracks, midpoints(cameras, tracks))
+    distance = residuals_px(cameras, tracks, triangulate_tracks(cameras, tracks))
     return tracks.kept(distance < 3 * settings.max_residual_px)
 
 
@@ -284,11 +291,11 @@ def _linked(tracks: Tracks, least: int) -> set[str]:
 
 
 def _measured(
-    cameras: dict[str, Camera], tracks: Tracks, settings: RefineSettings
+    cameras: dict[str, Camera], tracks: Tracks, settings: RigRefinementSettings
 ) -> tuple[np.ndarray, dict[str, float]]:
     """Expected pixels (K, 2) of tracks triangulated with these cameras; their error."""
-    points = midpoints(cameras, tracks)
-    _, points = adjust(cameras, tracks, points, free_poses=False, loss_px=settings.loss_px)
+    points = triangulate_tracks(cameras, tracks)
+    _, points = bundle_adjust(cameras, tracks, points, free_poses=False, loss_px=settings.loss_px)
     expected = np.zeros((len(tracks.track), 2))
     for i, name in enumerate(tracks.cameras):
         mine = tracks.camera == i

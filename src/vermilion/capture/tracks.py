@@ -32,7 +32,7 @@ class Features:
 
 @dataclass(frozen=True)
 class Tracks:
-    """Observations of points: K observations of `count` points.
+    """BoardViews of points: K observations of `count` points.
 
     Attributes:
         cameras: names; `camera` counts in them.
@@ -60,12 +60,12 @@ class Tracks:
         return Tracks(self.cameras, track, self.camera[keep], self.pixels[keep], self.frame[keep])
 
     def per_camera(self) -> np.ndarray:
-        """Observations of each camera, (C,)."""
+        """BoardViews of each camera, (C,)."""
         return np.bincount(self.camera, minlength=len(self.cameras))
 
 
 @dataclass(frozen=True)
-class MatchSettings:
+class FeatureMatchSettings:
     """How features are found and matched.
 
     Attributes:
@@ -107,7 +107,7 @@ def find_features(linear_rgb: np.ndarray, contrast: float, max_features: int) ->
 def match_frame(
     cameras: Mapping[str, Camera],
     features: Mapping[str, Features],
-    settings: MatchSettings,
+    settings: FeatureMatchSettings,
     frame: int = 0,
 ) -> Tracks:
     """Tracks of one frame: matched pairs of cameras, verified, joined.
@@ -124,7 +124,7 @@ def match_frame(
         cosine = cameras[a].rotation[2] @ cameras[b].rotation[2]
         if cosine < np.cos(np.radians(settings.max_angle_deg)):
             continue
-        pairs = match_pair(cameras[a], cameras[b], features[a], features[b], settings)
+        pairs = match_features(cameras[a], cameras[b], features[a], features[b], settings)
         links.append(pairs + np.array([starts[i], starts[j]]))
     links = np.concatenate(links)
     n = starts[-1]
@@ -143,7 +143,7 @@ def match_frame(
     return everything.kept(~clash[component])
 
 
-def join_tracks(parts: list[Tracks]) -> Tracks:
+def concatenate_tracks(parts: list[Tracks]) -> Tracks:
     """Tracks of several frames as one; each frame's points are its own."""
     offsets = np.cumsum([0] + [part.count for part in parts])
     track = [part.track + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
@@ -157,8 +157,8 @@ def join_tracks(parts: list[Tracks]) -> Tracks:
     )
 
 
-def match_pair(
-    a: Camera, b: Camera, of_a: Features, of_b: Features, settings: MatchSettings
+def match_features(
+    a: Camera, b: Camera, of_a: Features, of_b: Features, settings: FeatureMatchSettings
 ) -> np.ndarray:
     """Indices (M, 2) of features that look alike, lie near each other's epipolar line and agree
     with one essential matrix; none where fewer than `min_pair` do."""

@@ -88,7 +88,7 @@ class CalibrationConfig(StageConfig):
         return self
 
 
-class RefinementConfig(StageConfig):
+class RigRefinementConfig(StageConfig):
     """Refinement of the cameras' poses over skin and tattoo features (bundle adjustment)."""
 
     mode: Literal["off", "auto", "on"] = Field(
@@ -211,4 +211,6 @@ class CaptureConfig(StageConfig):
     calibration: CalibrationConfig = section(
         CalibrationConfig, "Calibration from images of a board."
     )
-    refinement: RefinementConfig = section(RefinementConfig, "Refinement of the cameras' poses.")
+    refinement: RigRefinementConfig = section(
+        RigRefinementConfig, "Refinement of the cameras' poses."
+    )

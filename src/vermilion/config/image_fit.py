@@ -67,7 +67,7 @@ class FrameFitConfig(StageConfig):
     )
 
 
-class JoinConfig(StageConfig):
+class SmoothingConfig(StageConfig):
     """The fitted frames of a take as one track."""
 
     weight_acceleration: float = Field(
@@ -117,7 +117,7 @@ class ImageFitConfig(StageConfig):
     )
     appearance: AppearanceConfig = section(AppearanceConfig, "Lighting and albedo.")
     frame_fit: FrameFitConfig = section(FrameFitConfig, "Pose and expression of one frame.")
-    join: JoinConfig = section(JoinConfig, "The frames as one track.")
+    join: SmoothingConfig = section(SmoothingConfig, "The frames as one track.")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

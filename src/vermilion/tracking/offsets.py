@@ -23,20 +23,20 @@ from vermilion.appearance.sampled_face import SampledFace
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 from vermilion.imaging.display import display_slope, to_display_values
-from vermilion.tracking.image_fit.frame_fit import View
+from vermilion.tracking.image_fit.frame_fit import FrameView
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
 from vermilion.tracking.landmark_fit.pose import rotation_of
 
 
 @dataclass(frozen=True)
-class LayerSettings:
+class OffsetSettings:
     """How far and how finely the layer may bend the model.
 
     Attributes:
         sigma_mm: deviation of the offsets.
         length_mm: over which they are alike.
-        sigma, robust_sigmas, strength: of the image, as in `PhotometricSettings`.
+        sigma, robust_sigmas, strength: of the image, as in `FrameFitSettings`.
         iterations: Gauss-Newton steps at each resolution, coarsest first; 0 skips one.
     """
 
@@ -48,7 +48,7 @@ class LayerSettings:
     iterations: Sequence[int] = (0, 1, 2)
 
 
-class CorrectiveLayer:
+class OffsetSolver:
     """Offsets of one person's mesh; what does not depend on the frame is made once."""
 
     def __init__(
@@ -57,7 +57,7 @@ class CorrectiveLayer:
         neutral_mm: np.ndarray,
         face: SampledFace,
         appearance: Appearance,
-        settings: LayerSettings,
+        settings: OffsetSettings,
     ):
         self.face, self.appearance, self.settings = face, appearance, settings
         self.at = appearance.samples.matrix(model.triangles, model.n_vertices)
@@ -68,7 +68,7 @@ class CorrectiveLayer:
         stiffness = sparse.diags(areas) + s.length_mm**4 * bending
         self.stiffness = sparse.csr_matrix(stiffness / (s.sigma_mm * s.length_mm) ** 2)
 
-    def solve(self, view: View) -> np.ndarray:
+    def solve(self, view: FrameView) -> np.ndarray:
         """Offsets (V, 3) mm in the head frame, the model being at `view.start`."""
         x = view.start
         rotation = rotation_of(x[:3]) @ view.reference

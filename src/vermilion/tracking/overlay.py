@@ -66,12 +66,12 @@ def tracking_overlay(
         drawn = draw_tracked(image, camera, vertices_mm[index], model)
         if frame in rows:
             drawn = draw_points(drawn, landmarks.points_px[rows[frame]], (0, 255, 0), 1)
-        crop = cut_to(drawn, camera.project(vertices_mm[index]))
+        crop = crop_to_points(drawn, camera.project(vertices_mm[index]))
         images.append(label(crop, f"{frame}" if valid[index] else f"{frame}: not tracked"))
     return tile(images, columns)
 
 
-def cut_to(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
+def crop_to_points(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
     """The square round points, resized to 480 x 480; black outside the image."""
     low, high = np.nanmin(points_px, axis=0), np.nanmax(points_px, axis=0)
     half = 0.5 * (1 + 2 * margin) * max(float((high - low).max()), 8.0)

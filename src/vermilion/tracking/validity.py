@@ -11,7 +11,7 @@ from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.result import TrackedTake
 
 
-def fits(
+def valid_frames(
     motion: HeadMotion, shape: LandmarkShape, focal_px: float, max_reprojection: float
 ) -> np.ndarray:
     """Frames (F,) bool whose landmarks were found and lie near the model's.

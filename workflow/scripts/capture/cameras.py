@@ -14,10 +14,10 @@ from vermilion.capture.overlay import (
     refinement_sheet,
     worst_view,
 )
-from vermilion.capture.refine import RefineSettings, refine_cameras
+from vermilion.capture.refine import RigRefinementSettings, refine_cameras
 from vermilion.capture.rig import calibration_views, image_sizes, rig_cameras
-from vermilion.capture.tracks import MatchSettings, find_features
-from vermilion.config.capture import CalibrationConfig, RefinementConfig
+from vermilion.capture.tracks import FeatureMatchSettings, find_features
+from vermilion.config.capture import CalibrationConfig, RigRefinementConfig
 from vermilion.geometry.camera import write_cameras
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import read_image, write_srgb8
@@ -55,7 +55,7 @@ def refinement(cfg, rig, manifest, first, last):
     values = cfg.model_dump()
     matching, settings = (
         kind(**{f.name: values[f.name] for f in fields(kind)})
-        for kind in (MatchSettings, RefineSettings)
+        for kind in (FeatureMatchSettings, RigRefinementSettings)
     )
     images = features_of(source, rig, frames, cfg)
     made = refine_cameras(rig.cameras, images, matching, settings, cfg.mode == "auto")
@@ -113,7 +113,7 @@ def main(snakemake):
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )
-    refine = RefinementConfig(**snakemake.params.cfg["capture.refinement"])
+    refine = RigRefinementConfig(**snakemake.params.cfg["capture.refinement"])
     summary, made = rig.summary(), None
     first, last = snakemake.params.frames
     if wanted(refine, rig):

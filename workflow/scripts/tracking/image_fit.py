@@ -4,8 +4,8 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.tracking.image_fit.take import TakeStart, refine_frames
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
+from vermilion.tracking.image_fit.take import TakeStart, fit_frames
 
 
 def main(snakemake):
@@ -14,9 +14,9 @@ def main(snakemake):
     appearance = Appearance.load(inputs.appearance)
     fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
     face, source = start.face(appearance.samples), open_frames(params.source, *place)
-    settings = PhotometricSettings(**cfg["tracking.image_fit.frame_fit"])
+    settings = FrameFitSettings(**cfg["tracking.image_fit.frame_fit"])
     problem = FrameProblem(face, appearance, settings, start.settings.weight_sigma)
-    refined = refine_frames(
+    refined = fit_frames(
         start,
         fit.valid[rows],
         lambda index: source.read(fit.camera.name, int(params.frames[index])),

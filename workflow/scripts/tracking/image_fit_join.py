@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from vermilion.storage.chunks import read_chunks
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.image_fit.join import join_frames
+from vermilion.tracking.image_fit.smooth_over_time import smooth_over_time
 from vermilion.tracking.image_fit.take import TakeStart
 
 
@@ -15,7 +15,7 @@ def main(snakemake):
     found = read_chunks(inputs.chunks, fit.frames, names)
     # Images tell weights and depth with more noise than landmarks do: so they are smoothed more.
     smooth = replace(start.settings, **cfg["tracking.image_fit.join"])
-    x = join_frames(
+    x = smooth_over_time(
         found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth
     )
     start.with_motion(fit, x).save(snakemake.output.fit)

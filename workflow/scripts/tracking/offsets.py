@@ -6,8 +6,8 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_sequence
-from vermilion.tracking.image_fit.take import TakeStart, readable
-from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
+from vermilion.tracking.image_fit.take import TakeStart, read_valid_frames
+from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 
 
 def main(snakemake):
@@ -17,8 +17,8 @@ def main(snakemake):
     fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
     face, source = start.face(appearance.samples), open_frames(params.source, *place)
     options = {k: v for k, v in cfg["tracking.offsets"].items() if k != "enabled"}
-    settings = LayerSettings(**options)
-    layer = CorrectiveLayer(start.model, start.identity.neutral_mm, face, appearance, settings)
+    settings = OffsetSettings(**options)
+    layer = OffsetSolver(start.model, start.identity.neutral_mm, face, appearance, settings)
     pixel_mm = cfg["tracking.image_fit.appearance"]["pixel_mm"]
     offsets = np.zeros((len(rows), start.model.n_vertices, 3))
 
@@ -26,7 +26,7 @@ def main(snakemake):
         return source.read(fit.camera.name, int(params.frames[index]))
 
     # A frame that cannot be read keeps the model alone, as where nothing is seen.
-    for index, image in readable(fit.valid[rows], read, "corrective layer"):
+    for index, image in read_valid_frames(fit.valid[rows], read, "corrective layer"):
         view = start.view(index, image, face, pixel_mm, len(settings.iterations))
         offsets[index] = layer.solve(view)
     write_sequence(snakemake.output[0], offsets)

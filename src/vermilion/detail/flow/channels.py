@@ -17,7 +17,7 @@ def channels(image: np.ndarray) -> np.ndarray:
     return np.concatenate([smooth, x, y, _across(x), _down(x), _down(y)], axis=2)
 
 
-def structure(image: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
+def structure_direction(image: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
     """Unit direction across image structures, (h, w, 2) float32: main axis of the structure tensor."""
     smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)

@@ -12,7 +12,7 @@ from vermilion.imaging.images import linear_to_srgb
 
 
 @dataclass(frozen=True)
-class Crop:
+class FaceCrop:
     """A rectangle of a camera's image, resized.
 
     Attributes:
@@ -26,7 +26,7 @@ class Crop:
     size_px: tuple[int, int]
 
     @classmethod
-    def around(cls, camera: Camera, points_px: np.ndarray, margin: float, most_px: int) -> Crop:
+    def around(cls, camera: Camera, points_px: np.ndarray, margin: float, most_px: int) -> FaceCrop:
         """Round points (..., 2) with a share of their extent as margin; at most `most_px` a side.
 
         Never enlarged. Raises ValueError where the points miss the image.

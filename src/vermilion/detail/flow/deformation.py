@@ -30,7 +30,7 @@ class DeformationSettings:
     depth_sigma_mm: float = 3.0
 
 
-def corrected_mesh(
+def deform_to_flow(
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
     camera: Camera,
@@ -58,7 +58,7 @@ def corrected_mesh(
     pixels = np.nan_to_num(camera.project(vertices_mm), nan=-1e6)
     places = (pixels - 0.5).astype(np.float32)[None]
     known = cv2.remap(mask.astype(np.float32), places, None, cv2.INTER_LINEAR)[0] > 0.99
-    chosen = spread(pixels, np.flatnonzero(visible & known), settings.spacing_px)
+    chosen = one_per_cell(pixels, np.flatnonzero(visible & known), settings.spacing_px)
     local = camera.to_camera(np.asarray(vertices_mm, dtype=np.float64))
     if not len(chosen):
         return np.array(vertices_mm, dtype=np.float64)
@@ -83,7 +83,7 @@ def corrected_mesh(
     return (local - camera.translation) @ camera.rotation
 
 
-def spread(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
+def one_per_cell(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
     """Of the candidates (ids into (V, 2) pixels), in each square of the image the most central."""
     if spacing_px <= 0 or not len(candidates):
         return candidates

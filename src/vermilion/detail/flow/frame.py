@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vermilion.detail.flow.crop import Crop
-from vermilion.detail.flow.deformation import DeformationSettings, corrected_mesh
+from vermilion.detail.flow.crop import FaceCrop
+from vermilion.detail.flow.deformation import DeformationSettings, deform_to_flow
 from vermilion.detail.flow.six_frame_flow import FlowSettings, SixFrames, corrective_flow
 from vermilion.detail.flow.synthetic import (
     FirstFrame,
+    masked_residual,
     motion_px,
-    photometric_residual,
     synthesise,
 )
 from vermilion.faces.model import FaceModel
@@ -23,7 +23,7 @@ _MARGIN = 0.06
 
 
 @dataclass(frozen=True)
-class CorrectionSettings:
+class FlowCorrectionSettings:
     """How a frame is corrected.
 
     Attributes:
@@ -54,7 +54,7 @@ class CorrectedFrame:
     flow_px: float
 
 
-def compared_triangles(model: FaceModel) -> np.ndarray:
+def skin_triangles(model: FaceModel) -> np.ndarray:
     """(T,) bool: the skin of the face; the inside of the mouth shows what no texture knows."""
     skin = model.regions["face"] & ~model.regions["mouth_inner"]
     return skin[model.triangles].all(axis=1)
@@ -69,13 +69,13 @@ class FlowCorrection:
         camera: Camera,
         first_image: np.ndarray,
         first_mm: np.ndarray,
-        settings: CorrectionSettings,
+        settings: FlowCorrectionSettings,
     ):
         """`first_image` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
         self.triangles, self.camera, self.settings = model.triangles, camera, settings
         self.face_vertices = model.regions["face"]
         self.rigid = model.regions["rigid"]
-        self.face = compared_triangles(model)
+        self.face = skin_triangles(model)
         crop = self._crop(first_mm[None])
         image = crop.image(first_image)
         self.first = FirstFrame(image, crop.camera, first_mm, self.triangles)
@@ -99,7 +99,7 @@ class FlowCorrection:
         )
         flow = corrective_flow(frames, self.settings.flow)
         visible = RayCaster(meshes[0], self.triangles).visible(crop.camera, meshes[0])
-        mesh = corrected_mesh(
+        mesh = deform_to_flow(
             meshes[0], self.triangles, crop.camera, flow, synthetic[0].mask,
             visible & self.face_vertices, self.rigid, self.settings.deformation,
         )  # fmt: skip
@@ -109,14 +109,14 @@ class FlowCorrection:
         length = np.linalg.norm(flow, axis=2)[synthetic[0].mask] * enlarged
         return CorrectedFrame(
             mesh,
-            photometric_residual(synthetic[0], true[0], both),
-            photometric_residual(after, true[0], both),
+            masked_residual(synthetic[0], true[0], both),
+            masked_residual(after, true[0], both),
             float(np.median(length)) if len(length) else float("nan"),
         )
 
-    def _crop(self, meshes_mm: np.ndarray) -> Crop:
+    def _crop(self, meshes_mm: np.ndarray) -> FaceCrop:
         points = self.camera.project(meshes_mm[:, self.face_vertices])
-        return Crop.around(self.camera, points, _MARGIN, self.settings.face_px)
+        return FaceCrop.around(self.camera, points, _MARGIN, self.settings.face_px)
 
     def _draw(self, camera: Camera, mesh_mm: np.ndarray, behind: np.ndarray):
         return synthesise(self.first, camera, mesh_mm, self.triangles, self.face, behind)

@@ -11,7 +11,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.imaging.draw import label, tile, to_display
 from vermilion.storage.errors import InputError
-from vermilion.tracking.overlay import cut_to
+from vermilion.tracking.overlay import crop_to_points
 
 _SQUARES = 40
 _OPACITY = 0.45
@@ -48,8 +48,8 @@ def checkerboard_sheet(
         except InputError:
             image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
         place = camera.project(before_mm[index])
-        tiles.append(label(cut_to(image, place), f"{frame}"))
+        tiles.append(label(crop_to_points(image, place), f"{frame}"))
         for name, mesh in (("coarse", before_mm[index]), ("corrected", after_mm[index])):
             drawn = draw_checkerboard(image, camera, mesh, model)
-            tiles.append(label(cut_to(drawn, place), f"{frame} {name}"))
+            tiles.append(label(crop_to_points(drawn, place), f"{frame} {name}"))
     return tile(tiles, 3)

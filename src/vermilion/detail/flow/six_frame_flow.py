@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vermilion.detail.flow import kernels
-from vermilion.detail.flow.channels import channels, structure
+from vermilion.detail.flow.channels import channels, structure_direction
 
 _LEAST_SIDE_PX = 24
 
@@ -92,7 +92,7 @@ def _solve_level(images, masks, flows, settings):
     """Improve (h, w, 5, 2) flows in place."""
     height, width = flows.shape[:2]
     maps = np.stack([channels(image) for image in images])
-    direction = structure(images[0])
+    direction = structure_direction(images[0])
     alpha = np.asarray(settings.smoothness, dtype=np.float32)
     similarity = np.array([0, 0, settings.similarity, 0, settings.similarity], dtype=np.float32)
     system = np.empty((height, width, 10, 10), dtype=np.float32)

@@ -91,6 +91,6 @@ def motion_px(
     return np.where(frame.hits.hit[..., None], np.nan_to_num(motion), 0).astype(np.float32)
 
 
-def photometric_residual(frame: SyntheticFrame, image: np.ndarray, mask: np.ndarray) -> float:
+def masked_residual(frame: SyntheticFrame, image: np.ndarray, mask: np.ndarray) -> float:
     """Mean absolute difference to the image over a mask, display values 0 to 255; NaN if empty."""
     return float(np.abs(frame.image - image)[mask].mean()) if mask.any() else float("nan")

@@ -11,7 +11,7 @@ from vermilion.geometry.sparse import CholeskyFactor
 _FIRM = 100.0
 
 
-def combine(
+def combine_positions_and_normals(
     skin_mm: np.ndarray,
     smooth: np.ndarray,
     wanted: np.ndarray,

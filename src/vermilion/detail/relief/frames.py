@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.detail.relief.combine import combine
+from vermilion.detail.relief.combine import combine_positions_and_normals
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.relief import ReliefSettings, solve_relief
-from vermilion.detail.relief.sight import FaceImage, Sight
-from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
+from vermilion.detail.relief.skin_observation import FaceImage, SkinObservation
+from vermilion.detail.relief.tilts import average_tilts, tangents, tilted_normals, tilts_of
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import incidence, triangle_normals, vertex_normals
@@ -25,7 +25,7 @@ from vermilion.tracking.result import TrackedTake
 
 
 @dataclass(frozen=True)
-class Scene:
+class ReliefScene:
     """What is needed to look at a frame.
 
     Attributes:
@@ -42,7 +42,7 @@ class Scene:
     face_px: int
 
     @classmethod
-    def open(cls, topology, inputs, source, place, span, cfg) -> Scene:
+    def open(cls, topology, inputs, source, place, span, cfg) -> ReliefScene:
         """Of a job's files: `fit`, `meshes` (chunks) and what `open_frames` opens.
 
         Args:
@@ -64,10 +64,10 @@ class Scene:
         """Smooth fine mesh (V', 3)."""
         return self.topology.refine(self.read_mesh(frame))
 
-    def sight(self, frame: int, fine_mm: np.ndarray) -> Sight:
+    def observe(self, frame: int, fine_mm: np.ndarray) -> SkinObservation:
         """Raises InputError without an image, ValueError where the face is not in it."""
         image, skin = self.read_image(frame), fine_mm[self.topology.skin_ids]
-        return FaceImage.of(image, self.camera, skin, self.face_px).sight(fine_mm, self.topology)
+        return FaceImage.of(image, self.camera, skin, self.face_px).observe(fine_mm, self.topology)
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ class ReliefChunk:
         return cls(**read_arrays(path, "relief", ["tilts", "along_mm", "reasons"]))
 
 
-def relief_of(
-    scene: Scene, frames: Sequence[int], light: ClipLight, settings: ReliefSettings
+def relief_of_frames(
+    scene: ReliefScene, frames: Sequence[int], light: ClipLight, settings: ReliefSettings
 ) -> ReliefChunk:
     """Relief of frames one by one; none, without trust, where a frame cannot be seen."""
     topology = scene.topology
@@ -107,17 +107,17 @@ def relief_of(
     for row, frame in enumerate(progress(list(frames), "relief")):
         fine = scene.fine(frame)
         try:
-            sight = scene.sight(frame, fine)
+            observed = scene.observe(frame, fine)
         except (InputError, ValueError) as error:  # no image, or the face is not in it
             reasons[row] = f"no relief: {error}"
             continue
         skin = fine[topology.skin_ids]
-        found = solve_relief(skin, scene.camera.rotation, sight, light, topology, settings)
+        found = solve_relief(skin, scene.camera.rotation, observed, light, topology, settings)
         smooth = vertex_normals(skin, topology.skin)
         shaped = vertex_normals(skin + found[:, None] * smooth, topology.skin)
         along[row] = found
         tilts[row, :, :2] = tilts_of(smooth, tangents(skin, smooth, topology), shaped)
-        tilts[row, :, 2] = (spread @ sight.trust) / count
+        tilts[row, :, 2] = (spread @ observed.trust) / count
     return ReliefChunk(tilts, along, np.array(reasons))
 
 
@@ -150,7 +150,7 @@ class ReliefReader:
         return str(chunk.reasons[row])
 
 
-def refined(
+def mesh_with_relief(
     topology: FineTopology,
     fine_mm: np.ndarray,
     reader: ReliefReader,
@@ -162,22 +162,28 @@ def refined(
     """Fine mesh (V', 3) with the relief of a frame, its normals averaged over a window of frames."""
     skin = fine_mm[topology.skin_ids]
     smooth = vertex_normals(skin, topology.skin)
-    tilts = averaged(reader.tilts, frame, span, window)
-    wanted = tilted(smooth, tangents(skin, smooth, topology), tilts)
-    along = combine(skin, smooth, wanted, topology, position_weight, reader.along_mm(frame))
+    tilts = average_tilts(reader.tilts, frame, span, window)
+    wanted = tilted_normals(smooth, tangents(skin, smooth, topology), tilts)
+    along = combine_positions_and_normals(
+        skin, smooth, wanted, topology, position_weight, reader.along_mm(frame)
+    )
     return topology.displaced(fine_mm, smooth, along)
 
 
-def errors_of(
-    topology: FineTopology, light: ClipLight, sight: Sight, fine_mm: np.ndarray, camera: Camera
+def shading_errors(
+    topology: FineTopology,
+    light: ClipLight,
+    observed: SkinObservation,
+    fine_mm: np.ndarray,
+    camera: Camera,
 ) -> np.ndarray:
     """Absolute difference (Q,) of the image to the shaded mesh, display values; NaN unseen."""
     normals = triangle_normals(fine_mm[topology.skin_ids], topology.skin) @ camera.rotation.T
-    error = np.abs(sight.colours - light.values(normals)).mean(axis=1)
-    return np.where(sight.trust * (light.seen > 0) > 0, error, np.nan)
+    error = np.abs(observed.colours - light.values(normals)).mean(axis=1)
+    return np.where(observed.trust * (light.seen > 0) > 0, error, np.nan)
 
 
-def residual_of(errors: np.ndarray, trust: np.ndarray) -> float:
+def mean_error(errors: np.ndarray, trust: np.ndarray) -> float:
     """Mean of errors (Q,) by trust (Q,) over what is seen; NaN if nothing is."""
     seen = np.isfinite(errors) & (trust > 0)
     return float(np.average(errors[seen], weights=trust[seen])) if seen.any() else float("nan")

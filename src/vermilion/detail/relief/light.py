@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.appearance.estimate import Sightings, estimate_appearance
+from vermilion.appearance.estimate import SampleObservations, estimate_appearance
 from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
 from vermilion.appearance.samples import SurfaceSamples
-from vermilion.detail.relief.short_range import DetailFilter
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.high_pass import HighPassFilter
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.imaging.images import srgb_to_linear
@@ -64,34 +64,38 @@ class ClipLight:
 
 def estimate_light(
     frames: Sequence[int],
-    sights: Sequence[Sight],
+    observations: Sequence[SkinObservation],
     topology: FineTopology,
     centres_mm: np.ndarray,
     detail_mm: float,
 ) -> ClipLight:
-    """Light, albedo and noise from sights of a few frames.
+    """Light, albedo and noise from observations of a few frames.
 
     The albedo is each triangle's own: what stays the same in all of these frames is paint, what
     changes is shading. A single frame has no noise.
 
     Args:
-        frames: numbers of the frames of `sights`.
+        frames: numbers of the frames of `observations`.
         centres_mm: (Q, 3) of the triangles in one of the frames.
         detail_mm: of the noise counts only what changes over shorter ranges.
     """
-    seen = Sightings(
-        np.stack([srgb_to_linear(s.colours / 255) for s in sights])[:, None].astype(np.float64),
-        np.stack([s.normals for s in sights]),
-        np.stack([s.trust for s in sights]),
+    seen = SampleObservations(
+        np.stack([srgb_to_linear(s.colours / 255) for s in observations])[:, None].astype(
+            np.float64
+        ),
+        np.stack([s.normals for s in observations]),
+        np.stack([s.trust for s in observations]),
     )
     n = len(topology.skin)
     middle = SurfaceSamples(np.arange(n, dtype=np.int32), np.full((n, 3), 1 / 3))
     found = estimate_appearance(np.asarray(frames), middle, seen, _PRIOR)
     light = ClipLight(found.light, found.albedo[0], found.seen, np.zeros(n), found.frames)
-    detail = DetailFilter(topology.pairs, centres_mm, found.seen, detail_mm)
-    left = np.stack([detail((s.colours - light.values(s.normals)).mean(axis=1)) for s in sights])
+    detail = HighPassFilter(topology.pairs, centres_mm, found.seen, detail_mm)
+    left = np.stack(
+        [detail((s.colours - light.values(s.normals)).mean(axis=1)) for s in observations]
+    )
     squared = (seen.trust * left**2).sum(axis=0) / np.maximum(found.seen, 1e-9)
     # A triangle's mean has taken a share of its noise along.
-    share = len(sights) / max(len(sights) - 1, 1)
-    near = DetailFilter(topology.pairs, centres_mm, found.seen, _NOISE_MM).smooth(squared)
+    share = len(observations) / max(len(observations) - 1, 1)
+    near = HighPassFilter(topology.pairs, centres_mm, found.seen, _NOISE_MM).smooth(squared)
     return replace(light, noise=np.sqrt(share * np.maximum(near, 0)))

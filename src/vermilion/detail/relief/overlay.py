@@ -8,7 +8,7 @@ from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import colour_map, draw_mesh, label, to_display
-from vermilion.tracking.overlay import cut_to
+from vermilion.tracking.overlay import crop_to_points
 
 _WORST = 40.0  # display values at the hottest colour
 
@@ -41,4 +41,4 @@ def relief_panels(
         ("refined", draw_mesh(shown, camera, refined_mm, topology.triangles)),
         ("left over", left),
     ]
-    return [label(cut_to(panel, place), text) for text, panel in panels]
+    return [label(crop_to_points(panel, place), text) for text, panel in panels]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from vermilion.detail.relief.high_pass import HighPassFilter
 from vermilion.detail.relief.light import ClipLight
-from vermilion.detail.relief.short_range import DetailFilter
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.mesh import triangle_areas, triangle_cross, vertex_areas, vertex_normals
 from vermilion.geometry.sparse import CholeskyFactor
@@ -44,7 +44,7 @@ class ReliefSettings:
 def solve_relief(
     skin_mm: np.ndarray,
     world_to_camera: np.ndarray,
-    sight: Sight,
+    observed: SkinObservation,
     light: ClipLight,
     topology: FineTopology,
     settings: ReliefSettings,
@@ -58,12 +58,12 @@ def solve_relief(
     """
     normals = vertex_normals(skin_mm, topology.skin)
     n, q = len(skin_mm), len(topology.skin)
-    trust = sight.trust * (light.seen > 0)
+    trust = observed.trust * (light.seen > 0)
     if not trust.any():
         return np.zeros(n)
     centres = skin_mm[topology.skin].mean(axis=1)
-    detail = DetailFilter(topology.pairs, centres, trust, settings.detail_mm)
-    sigma = deviation(light, sight, topology, centres, settings)
+    detail = HighPassFilter(topology.pairs, centres, trust, settings.detail_mm)
+    sigma = value_deviation(light, observed, topology, centres, settings)
     stiff = _regulariser(skin_mm, topology, settings)
     areas = triangle_areas(skin_mm, topology.skin)
     worth = trust * np.minimum(areas / _SAMPLE_MM2, 1.0)
@@ -74,7 +74,7 @@ def solve_relief(
         length = np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
         facing = cross / length
         inner = facing @ world_to_camera.T
-        error = detail((sight.colours - light.values(inner)).mean(axis=1))
+        error = detail((observed.colours - light.values(inner)).mean(axis=1))
         if scale is None:
             # Relief is rare: what is off everywhere is a mesh that lies badly on the image.
             scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
@@ -96,15 +96,15 @@ def solve_relief(
     return along
 
 
-def deviation(
+def value_deviation(
     light: ClipLight,
-    sight: Sight,
+    observed: SkinObservation,
     topology: FineTopology,
     centres_mm: np.ndarray,
     settings: ReliefSettings,
 ) -> np.ndarray:
     """Typical error (Q,) of the triangles' values: the clip's noise, and paint that is misplaced."""
-    shown = light.values(sight.normals).mean(axis=1)
+    shown = light.values(observed.normals).mean(axis=1)
     i, j = topology.pairs.T
     apart = np.maximum(np.linalg.norm(centres_mm[i] - centres_mm[j], axis=1), 0.2)
     steep = ((shown[i] - shown[j]) / apart) ** 2

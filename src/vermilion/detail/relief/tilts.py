@@ -27,12 +27,12 @@ def tilts_of(smooth: np.ndarray, tangent: np.ndarray, fine: np.ndarray) -> np.nd
     return np.stack([(fine * t).sum(axis=1) / height for t in tangent], axis=1)
 
 
-def tilted(smooth: np.ndarray, tangent: np.ndarray, tilts: np.ndarray) -> np.ndarray:
+def tilted_normals(smooth: np.ndarray, tangent: np.ndarray, tilts: np.ndarray) -> np.ndarray:
     """Unit normals (S, 3) with tilts (S, 2)."""
     return normalised(smooth + tilts[:, :1] * tangent[0] + tilts[:, 1:] * tangent[1])
 
 
-def averaged(
+def average_tilts(
     read: Callable[[int], np.ndarray], frame: int, span: tuple[int, int], window: int
 ) -> np.ndarray:
     """Mean tilts (S, 2) of the frames about one (window odd, symmetric), by their trust.

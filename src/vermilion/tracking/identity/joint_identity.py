@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.appearance.estimate import (
-    Sightings,
+    SampleObservations,
     estimate_appearance,
     fit_albedo,
-    middle_colour,
+    median_colour,
 )
 from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
@@ -32,12 +32,16 @@ from vermilion.geometry.camera import Camera
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.identity.landmark_identity import IdentityFit, IdentityProblem
 from vermilion.tracking.image_fit.frame_fit import visible_trust
-from vermilion.tracking.image_fit.image_levels import Level, levels_of
-from vermilion.tracking.landmark_fit.descent import descend, pressed
+from vermilion.tracking.image_fit.image_levels import PyramidLevel, image_pyramid
 from vermilion.tracking.landmark_fit.expression import N_POSE
+from vermilion.tracking.landmark_fit.gauss_newton import active_bounds, gauss_newton
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
 from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
-from vermilion.tracking.landmark_fit.shape import growth, landmark_identities, landmark_neutral
+from vermilion.tracking.landmark_fit.shape import (
+    landmark_identities,
+    landmark_neutral,
+    uniform_scale_share,
+)
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def fit_joint_identity(
         held = _Round(model, problem, samples, images, cameras, settings, frames, shared)
         if turn == 0:
             looks.append(held.residuals(frames, shared))
-        frames, shared = descend(held, frames, shared, settings.iterations)
+        frames, shared = gauss_newton(held, frames, shared, settings.iterations)
     looks.append(held.residuals(frames, shared))
     return JointFit(
         problem.result(frames, shared), [list(pair) for pair in zip(*looks, strict=True)]
@@ -140,11 +144,11 @@ class _Round:
         self.n_identity = problem.n_identity
         self.centre = shared[: self.n_identity].copy()
         self.takes = [np.flatnonzero(problem.take == take) for take in np.unique(problem.take)]
-        identities = _without_size(model)
+        identities = _scale_free_identities(model)
         neutral = model.neutral_mm + np.tensordot(self.centre, identities, axes=1)
         shapes = np.concatenate([model.expressions_mm, identities.astype(np.float32)])
         self.face = SampledFace.of(model, neutral, samples, shapes)
-        self.levels: list[Level] = []
+        self.levels: list[PyramidLevel] = []
         self.trust = np.zeros((len(frames), len(samples)))
         for index, (row, image) in enumerate(zip(frames, images, strict=True)):
             rotation = rotation_of(row[:3]) @ problem.reference
@@ -154,7 +158,7 @@ class _Round:
             shape = neutral + np.tensordot(row[N_POSE:], model.expressions_mm, axes=1)
             mesh = shape @ rotation.T + row[3:6]
             self.trust[index] = visible_trust(model, mesh, points, normals)
-            self.levels += levels_of(image, cameras[index], points, settings.pixel_mm, 1)
+            self.levels += image_pyramid(image, cameras[index], points, settings.pixel_mm, 1)
         self.lights = [self._light(rows, frames, shared) for rows in self.takes]
 
     def _weights(self, row: np.ndarray, shared: np.ndarray) -> np.ndarray:
@@ -174,7 +178,7 @@ class _Round:
 
     def _light(self, rows, frames, shared) -> np.ndarray:
         looks = [self._look(index, frames, shared) for index in rows]
-        seen = Sightings(
+        seen = SampleObservations(
             np.stack([look.colours for look in looks])[:, None],
             np.stack([look.normals for look in looks]),
             np.stack([look.trust for look in looks]),
@@ -187,7 +191,7 @@ class _Round:
         colours = np.stack([look.colours for look in looks])
         trust = np.stack([look.trust for look in looks])
         shading = irradiance(np.stack([look.normals for look in looks]), light)
-        skin = middle_colour(colours / shading, trust)
+        skin = median_colour(colours / shading, trust)
         albedo = fit_albedo(colours, shading, trust, skin, s.albedo_prior)
         predicted = albedo * shading
         errors = to_display_values(colours) - to_display_values(predicted)
@@ -226,7 +230,7 @@ class _Round:
         gradient[:first], gradient[first:] = known.frame_gradient.ravel(), known.shared_gradient
         for take, (rows, light) in enumerate(zip(self.takes, self.lights, strict=True)):
             self._add_images(matrix, gradient, take, rows, light, frames, shared)
-        held = pressed(frames, gradient[:first].reshape(frames.shape))
+        held = active_bounds(frames, gradient[:first].reshape(frames.shape))
         free = np.concatenate([~held.ravel(), np.ones(len(shared), dtype=bool)])
         system = matrix[np.ix_(free, free)]
         system[np.diag_indices_from(system)] *= 1 + 1e-3  # what nothing tells stays put
@@ -298,9 +302,9 @@ class _Round:
         return [results[index] for index in range(len(frames))]
 
 
-def _without_size(model: FaceModel) -> np.ndarray:
+def _scale_free_identities(model: FaceModel) -> np.ndarray:
     """Identities (I, V, 3) less what they change of the landmarks' size, as the landmarks' energy."""
     landmarks = landmark_neutral(model)
-    share = growth(landmark_identities(model), landmarks)
+    share = uniform_scale_share(landmark_identities(model), landmarks)
     about = model.neutral_mm - landmarks.mean(axis=0)
     return model.identities_mm - share[:, None, None] * about

@@ -12,8 +12,12 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.storage.errors import InputError
-from vermilion.tracking.landmark_fit.descent import NormalEquations, descend, pressed
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
+from vermilion.tracking.landmark_fit.gauss_newton import (
+    NormalEquations,
+    active_bounds,
+    gauss_newton,
+)
 from vermilion.tracking.landmark_fit.observation import (
     LandmarkNoise,
     Observations,
@@ -25,7 +29,11 @@ from vermilion.tracking.landmark_fit.observation import (
     whitening,
 )
 from vermilion.tracking.landmark_fit.pose import rotation_of
-from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
+from vermilion.tracking.landmark_fit.shape import (
+    LandmarkShape,
+    landmark_identities,
+    without_uniform_scale,
+)
 from vermilion.tracking.landmark_fit.start import first_guess, in_chart
 
 
@@ -42,7 +50,7 @@ class IdentitySettings:
         iterations: of Gauss-Newton, at most.
     """
 
-    fit: FitSettings = field(default_factory=FitSettings)
+    fit: LandmarkFitSettings = field(default_factory=LandmarkFitSettings)
     bias: LandmarkNoise = field(default_factory=lambda: LandmarkNoise(0.08, 0.05, 0.04, 0.04, 0.04))
     neutral_weight_sigma: float = 0.03
     focal_sigma: float = 0.3
@@ -108,7 +116,7 @@ class IdentityProblem:
             )
         self.samples, self.settings = samples, settings
         self.shape = LandmarkShape.of(model)
-        self.identities = without_size(landmark_identities(model), self.shape.neutral_mm)
+        self.identities = without_uniform_scale(landmark_identities(model), self.shape.neutral_mm)
         self.n_identity, self.n_weights = len(self.identities), self.shape.n_expressions
         parts = [sample.seen[k] for sample, k in zip(samples, keep, strict=True)]
         self.image = np.concatenate([part.image for part in parts])
@@ -230,7 +238,7 @@ class IdentityProblem:
     def newton_step(self, frames: np.ndarray, shared: np.ndarray):
         """Gauss-Newton step with the weights that press against their bounds held."""
         found = self.normal_equations(frames, shared)
-        held = pressed(frames, found.frame_gradient)
+        held = active_bounds(frames, found.frame_gradient)
         gradient = np.where(held, 0.0, found.frame_gradient)
         coupling = np.where(held[..., None], 0.0, found.coupling)
         blocks = np.where(held[:, None] | held[..., None], 0.0, found.blocks)
@@ -246,7 +254,7 @@ class IdentityProblem:
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:
         """Frames (F, 6 + K) and shared unknowns (S,) from landmarks alone."""
-        return descend(self, *self.first_guess(), self.settings.iterations)
+        return gauss_newton(self, *self.first_guess(), self.settings.iterations)
 
     def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
         image = project(self._camera_points(frames, shared), self.focal(shared))

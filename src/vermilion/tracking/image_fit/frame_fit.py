@@ -20,7 +20,7 @@ from vermilion.appearance.sampled_face import SampledFace
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.display import display_slope, to_display_values
-from vermilion.tracking.image_fit.image_levels import Level
+from vermilion.tracking.image_fit.image_levels import PyramidLevel
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.expression import N_POSE
@@ -29,7 +29,7 @@ from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, ro
 
 
 @dataclass(frozen=True)
-class PhotometricSettings:
+class FrameFitSettings:
     """How much the image counts.
 
     Attributes:
@@ -53,7 +53,7 @@ class PhotometricSettings:
 
 
 @dataclass(frozen=True)
-class View:
+class FrameView:
     """One frame: what the model is compared with.
 
     Attributes:
@@ -65,7 +65,7 @@ class View:
         reference: (3, 3) about which the rotation vector turns.
     """
 
-    levels: list[Level]
+    levels: list[PyramidLevel]
     focal_px: float
     trust: np.ndarray
     landmarks: LandmarkTerm
@@ -103,7 +103,7 @@ class FrameProblem:
         self,
         face: SampledFace,
         appearance: Appearance,
-        settings: PhotometricSettings,
+        settings: FrameFitSettings,
         weight_sigma: float,
     ):
         self.face, self.appearance, self.settings = face, appearance, settings
@@ -122,7 +122,7 @@ class FrameProblem:
         self.upper = -self.lower
         self.lower[N_POSE:], self.upper[N_POSE:] = 0.0, 1.0
 
-    def solve(self, view: View) -> FrameFit:
+    def solve(self, view: FrameView) -> FrameFit:
         """Coarse to fine from the landmark fit."""
         x, counts = view.start, self.settings.iterations
         none = np.zeros((0, len(x)))
@@ -150,7 +150,7 @@ class FrameProblem:
         matrix, right = self._normal_equations(x, view, 0, part)
         return FrameFit(x, matrix, right)
 
-    def _part(self, view: View, every: int) -> _Part:
+    def _part(self, view: FrameView, every: int) -> _Part:
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))[::every]
         return _Part(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
 

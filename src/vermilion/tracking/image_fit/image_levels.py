@@ -14,7 +14,7 @@ _MARGIN_MM = 12.0
 
 
 @dataclass(frozen=True)
-class Level:
+class PyramidLevel:
     """One resolution.
 
     Attributes:
@@ -50,13 +50,13 @@ class Level:
         return found[0], slopes, inside
 
 
-def levels_of(
+def image_pyramid(
     image: np.ndarray,
     camera: Camera,
     points_mm: np.ndarray,
     pixel_mm: float,
     count: int,
-) -> list[Level]:
+) -> list[PyramidLevel]:
     """The image round points in the camera frame, finest level first.
 
     Args:
@@ -86,7 +86,7 @@ def levels_of(
             )
         soft = cv2.GaussianBlur(small, (0, 0), 0.7)
         slopes = [cv2.Sobel(soft, cv2.CV_32F, *axis, ksize=3, scale=0.125) for axis in _AXES]
-        levels.append(Level(soft, *slopes, origin, size / shape))
+        levels.append(PyramidLevel(soft, *slopes, origin, size / shape))
     return levels
 
 

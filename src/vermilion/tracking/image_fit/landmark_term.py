@@ -8,7 +8,7 @@ import numpy as np
 
 from vermilion.tracking.landmark_fit.expression import (
     N_POSE,
-    FitSettings,
+    LandmarkFitSettings,
     landmark_cost,
     landmark_equations,
 )
@@ -33,7 +33,7 @@ class LandmarkTerm:
     seen: Observations
     focal_px: float
     sigma_px: np.ndarray
-    settings: FitSettings
+    settings: LandmarkFitSettings
 
     @classmethod
     def of(
@@ -42,7 +42,7 @@ class LandmarkTerm:
         seen: Observations,
         focal_px: float,
         depth_mm: float,
-        settings: FitSettings,
+        settings: LandmarkFitSettings,
     ) -> LandmarkTerm:
         """With deviations that are a share of the inter-ocular distance at `depth_mm`."""
         corners = shape.neutral_mm[[36, 45]]

@@ -15,12 +15,12 @@ from vermilion.geometry.mesh import normalised, vertex_normals
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.imaging.draw import colour_map, label, tile, to_display
 from vermilion.tracking.image_fit.take import TakeStart
-from vermilion.tracking.overlay import cut_to
+from vermilion.tracking.overlay import crop_to_points
 
 _WORST = 40.0  # display values at the hottest colour
 
 
-def to_vertices(
+def samples_to_vertices(
     values: np.ndarray,
     trust: np.ndarray,
     samples: SurfaceSamples,
@@ -49,16 +49,16 @@ def appearance_image(
     hits = RayCaster(world, triangles).see(camera)
     normals = interpolate(hits, triangles, vertex_normals(local, triangles))
     light = irradiance(normalised(normals), appearance.light)
-    vertices = to_vertices(
+    vertices = samples_to_vertices(
         appearance.albedo[0], np.minimum(appearance.seen, 1.0), appearance.samples, triangles,
         len(local),
     )  # fmt: skip
     albedo = interpolate(hits, triangles, vertices)
     place, original = camera.project(world), to_display(image)
-    panels = [label(cut_to(original, place), "image")]
+    panels = [label(crop_to_points(original, place), "image")]
     for name, colours in (("model", albedo * light), ("albedo", albedo), ("light", 0.5 * light)):
         shown = np.where(hits.hit[..., None], to_display(colours), original)
-        panels.append(label(cut_to(shown, place), name))
+        panels.append(label(crop_to_points(shown, place), name))
     return np.hstack(panels)
 
 
@@ -80,7 +80,7 @@ def residual_sheet(
     for name, image, results in rows:
         original = to_display(image)
         points = results[0][3] * squeeze + k[:2, 2]
-        panels.append(label(cut_to(original, points), name))
+        panels.append(label(crop_to_points(original, points), name))
         for text, errors, trust, place in results:
             panels.append(
                 label(
@@ -99,4 +99,4 @@ def _error_image(original, points, errors, trust, place):
     shown = original.copy()
     for (column, row), colour in zip(place[seen], colours.astype(int).tolist(), strict=True):
         cv2.circle(shown, (int(column), int(row)), radius, colour, -1)
-    return cut_to(shown, points)
+    return crop_to_points(shown, points)

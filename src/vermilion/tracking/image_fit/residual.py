@@ -7,14 +7,14 @@ import numpy as np
 from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.imaging.display import to_display_values
-from vermilion.tracking.image_fit.frame_fit import View
+from vermilion.tracking.image_fit.frame_fit import FrameView
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
 from vermilion.tracking.landmark_fit.pose import rotation_of
 
 
 def sample_errors(
-    view: View,
+    view: FrameView,
     x: np.ndarray,
     face: SampledFace,
     appearance: Appearance,

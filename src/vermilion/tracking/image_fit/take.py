@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from vermilion.appearance.estimate import Appearance, Sightings, estimate_appearance
+from vermilion.appearance.estimate import Appearance, SampleObservations, estimate_appearance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.appearance.samples import SurfaceSamples
 from vermilion.faces.model import FaceModel
@@ -17,16 +17,16 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import JAW
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, View, visible_trust
-from vermilion.tracking.image_fit.image_levels import levels_of
+from vermilion.tracking.image_fit.frame_fit import FrameProblem, FrameView, visible_trust
+from vermilion.tracking.image_fit.image_levels import image_pyramid
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, project
 from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.landmark_fit.start import in_chart
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.settings import landmark_fit_settings
 
 
 class StartFiles(Protocol):
@@ -58,7 +58,7 @@ class TakeStart:
     x: np.ndarray
     reference: np.ndarray
     seen: Observations
-    settings: FitSettings
+    settings: LandmarkFitSettings
 
     @classmethod
     def of(
@@ -67,7 +67,7 @@ class TakeStart:
         identity: Identity,
         fit: TrackedTake,
         track: LandmarkTrack,
-        settings: FitSettings,
+        settings: LandmarkFitSettings,
         rows: np.ndarray | None = None,
     ) -> TakeStart:
         """Some rows of a landmark fit (all by default); `track` has these frames' landmarks."""
@@ -99,7 +99,7 @@ class TakeStart:
         fit = TrackedTake.load(inputs.fit)
         rows = np.arange(len(fit.frames)) if frames is None else fit.index_of(frames)
         track = LandmarkTrack.load(inputs.landmarks)
-        settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+        settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
         model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
         return fit, rows, cls.of(model, identity, fit, track, settings, rows)
 
@@ -136,14 +136,14 @@ class TakeStart:
 
     def view(
         self, row: int, image: np.ndarray, face: SampledFace, pixel_mm: float, levels: int
-    ) -> View:
+    ) -> FrameView:
         """What the refinement of one frame needs, from its image (h, w, 3) linear."""
         x, focal = self.x[row], focal_px(self.camera)
         rotation = rotation_of(x[:3]) @ self.reference
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
-        return View(
-            levels_of(image, self.camera, points, pixel_mm, levels),
+        return FrameView(
+            image_pyramid(image, self.camera, points, pixel_mm, levels),
             focal,
             visible_trust(self.model, self.vertices(x), points, normals),
             LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
@@ -152,7 +152,9 @@ class TakeStart:
         )
 
 
-def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sightings:
+def observe_samples(
+    views: list[FrameView], xs: list[np.ndarray], face: SampledFace
+) -> SampleObservations:
     """What views show at the samples, the face being at unknowns xs (6 + K each)."""
     colours, normals, trust = [], [], []
     for view, x in zip(views, xs, strict=True):
@@ -162,12 +164,12 @@ def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sig
         colours.append(np.stack([values for values, _, _ in found]))
         normals.append(face.normals(x[N_POSE:]) @ rotation.T)
         trust.append(view.trust * found[0][2])
-    return Sightings(np.stack(colours), np.stack(normals), np.stack(trust))
+    return SampleObservations(np.stack(colours), np.stack(normals), np.stack(trust))
 
 
 def learn_appearance(
     frames: np.ndarray,
-    views: list[View],
+    views: list[FrameView],
     face: SampledFace,
     samples: SurfaceSamples,
     albedo_prior: float,
@@ -177,13 +179,15 @@ def learn_appearance(
     """Light and albedo from some frames, whose poses and expressions are improved in turns with it."""
     xs = [view.start for view in views]
     for _ in range(rounds):
-        appearance = estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
+        appearance = estimate_appearance(
+            frames, samples, observe_samples(views, xs, face), albedo_prior
+        )
         problem = problem_of(appearance)
         xs = [problem.solve(view).x for view in views]
-    return estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
+    return estimate_appearance(frames, samples, observe_samples(views, xs, face), albedo_prior)
 
 
-def readable(
+def read_valid_frames(
     valid: np.ndarray, read: Callable[[int], np.ndarray], name: str
 ) -> Iterator[tuple[int, np.ndarray]]:
     """(row, image) of the valid rows (F,) bool; those that `read` cannot give are left out.
@@ -197,7 +201,7 @@ def readable(
             continue
 
 
-def refine_frames(
+def fit_frames(
     start: TakeStart,
     valid: np.ndarray,
     read: Callable[[int], np.ndarray],
@@ -220,7 +224,7 @@ def refine_frames(
         "refined": np.zeros(n_frames, dtype=bool),
     }
     levels = len(problem.settings.iterations)
-    for row, image in readable(valid, read, "photometric refinement"):
+    for row, image in read_valid_frames(valid, read, "photometric refinement"):
         found = problem.solve(start.view(row, image, problem.face, pixel_mm, levels))
         result["x"][row], result["matrix"][row] = found.x, found.matrix
         result["right"][row], result["refined"][row] = found.right, True

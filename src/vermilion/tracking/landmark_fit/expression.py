@@ -35,7 +35,7 @@ _FRAMES_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class FitSettings:
+class LandmarkFitSettings:
     """What is typical of landmarks, faces and heads; the same for everybody.
 
     Attributes:
@@ -88,13 +88,13 @@ def fit_motion(
     seen: Observations,
     focal_px: float,
     fps: float,
-    settings: FitSettings | None = None,
+    settings: LandmarkFitSettings | None = None,
 ) -> HeadMotion:
     """Fit all frames of a take. Frames without landmarks are interpolated.
 
     Raises InputError where no frame has landmarks.
     """
-    settings = settings or FitSettings()
+    settings = settings or LandmarkFitSettings()
     problem = _TakeProblem(shape, seen, focal_px, fps, settings)
     x = problem.first_guess()
     cost = problem.cost(x)
@@ -209,7 +209,7 @@ def landmark_cost(
     seen: Observations,
     focal_px: float,
     sigma_px: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> float:
     """Landmark term of the energy, the model's landmarks being at (F, 66, 3) in the camera frame."""
     _, residual = _whitened(points_mm, seen, focal_px, sigma_px, settings)
@@ -223,7 +223,7 @@ def landmark_equations(
     sigma_px: np.ndarray,
     reference: np.ndarray,
     x: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Newton matrices (F, P, P) and gradients (F, P) of the landmark term.
 
@@ -251,7 +251,7 @@ def _whitened(
     seen: Observations,
     focal_px: float,
     sigma_px: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whitening matrices (F, 66, 2, 2) and whitened residuals (F, 66, 2)."""
     image = project(points_mm, focal_px)

@@ -55,17 +55,20 @@ def landmark_identities(model: FaceModel) -> np.ndarray:
     return model.identities_mm[:, model.landmarks].astype(np.float64)
 
 
-def without_size(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+def without_uniform_scale(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
     """Displacements (I, N, 3) less their share of uniform growth of the neutral (N, 3).
 
     One camera cannot tell a small near head from a large far one. Left in, growth would be set by
     what it does to the blend weights: on a smaller head the same motion needs smaller ones.
     """
     centred = neutral_mm - neutral_mm.mean(axis=0)
-    return displacements_mm - growth(displacements_mm, neutral_mm)[:, None, None] * centred
+    return (
+        displacements_mm
+        - uniform_scale_share(displacements_mm, neutral_mm)[:, None, None] * centred
+    )
 
 
-def growth(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+def uniform_scale_share(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
     """Share (I,) of uniform growth of the neutral (N, 3) in displacements (I, N, 3)."""
     centred = neutral_mm - neutral_mm.mean(axis=0)
     return np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()

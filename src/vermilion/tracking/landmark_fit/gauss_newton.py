@@ -10,7 +10,7 @@ import numpy as np
 from vermilion.tracking.landmark_fit.expression import N_POSE
 
 
-class Descent(Protocol):
+class GaussNewtonProblem(Protocol):
     """An energy of `frames` (F, 6 + K) and `shared` (S,) unknowns, with its Gauss-Newton step."""
 
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
@@ -20,8 +20,8 @@ class Descent(Protocol):
         """Steps of both."""
 
 
-def descend(
-    problem: Descent, frames: np.ndarray, shared: np.ndarray, iterations: int
+def gauss_newton(
+    problem: GaussNewtonProblem, frames: np.ndarray, shared: np.ndarray, iterations: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """The unknowns after at most `iterations` steps, each shortened until the energy falls."""
     cost = problem.cost(frames, shared)
@@ -61,7 +61,7 @@ class NormalEquations:
     shared_gradient: np.ndarray
 
 
-def pressed(frames: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+def active_bounds(frames: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """(F, 6 + K) bool: weights at a bound that the energy's gradient would push past it."""
     held = np.zeros(frames.shape, dtype=bool)
     weights, pull = frames[:, N_POSE:], gradient[:, N_POSE:]

@@ -8,7 +8,9 @@ import numpy as np
 _TURN = 0.35
 
 
-def choose_frames(x: np.ndarray, valid: np.ndarray, error_px: np.ndarray, count: int) -> np.ndarray:
+def choose_appearance_frames(
+    x: np.ndarray, valid: np.ndarray, error_px: np.ndarray, count: int
+) -> np.ndarray:
     """Rows of well-fitted frames that differ most in pose and expression, sorted.
 
     The best-fitted frame first, then always the frame farthest from those chosen. Frames whose

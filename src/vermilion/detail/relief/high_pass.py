@@ -19,7 +19,7 @@ def graph_laplacian(pairs: np.ndarray, centres_mm: np.ndarray, length_mm: float)
     return sparse.diags(np.asarray(graph.sum(axis=1)).ravel()) - graph
 
 
-class DetailFilter:
+class HighPassFilter:
     """Values less their smooth part, which is drawn to them by trust and to its neighbours."""
 
     def __init__(self, pairs, centres_mm, trust, length_mm: float):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.detail.flow.crop import Crop
+from vermilion.detail.flow.crop import FaceCrop
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, triangle_normals
@@ -19,7 +19,7 @@ _GRAZING = 0.25  # cosine to the view below which a triangle tells nothing
 
 
 @dataclass(frozen=True)
-class Sight:
+class SkinObservation:
     """One frame.
 
     Attributes:
@@ -48,7 +48,7 @@ class FaceImage:
     @classmethod
     def of(cls, linear: np.ndarray, camera: Camera, skin_mm: np.ndarray, most_px: int):
         """From a linear image (h, w, 3); the face reduced to `most_px`; ValueError if not in it."""
-        crop = Crop.around(camera, camera.project(skin_mm), _MARGIN, most_px)
+        crop = FaceCrop.around(camera, camera.project(skin_mm), _MARGIN, most_px)
         return cls(cv2.GaussianBlur(crop.image(linear), (0, 0), 0.8), crop.camera)
 
     def colours(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ class FaceImage:
         found = cv2.remap(self.values, table, None, cv2.INTER_LINEAR).reshape(-1, 3)
         return found[: len(place)].astype(np.float64), inside
 
-    def sight(self, fine_mm: np.ndarray, topology: FineTopology) -> Sight:
+    def observe(self, fine_mm: np.ndarray, topology: FineTopology) -> SkinObservation:
         """At the centres of the skin's triangles of a fine mesh (V', 3)."""
         own = fine_mm[topology.skin_ids]
         centres = own[topology.skin].mean(axis=1)
@@ -75,4 +75,4 @@ class FaceImage:
         facing = np.flatnonzero(trust > 0)
         caster = RayCaster(fine_mm, topology.triangles)
         trust[facing] *= caster.visible(self.camera, centres[facing], tolerance_mm=0.5)
-        return Sight(colours, trust, normals @ self.camera.rotation.T)
+        return SkinObservation(colours, trust, normals @ self.camera.rotation.T)

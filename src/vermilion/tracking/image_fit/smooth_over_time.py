@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
 
 
-def join_frames(
+def smooth_over_time(
     matrices: np.ndarray,
     rights: np.ndarray,
     start: np.ndarray,
     refined: np.ndarray,
     fps: float,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> np.ndarray:
     """Minimum (F, 6 + K) of the frames' quadratics and of squared second differences over time.
 
