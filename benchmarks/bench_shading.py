@@ -1,4 +1,4 @@
-"""Accuracy and speed of the shading refinement on a known bump, against SciPy's SuperLU in its place.
+"""Accuracy and speed of the relief solver on a known bump, against SciPy's SuperLU in its place.
 
     python -m benchmarks.bench_shading
 
@@ -16,10 +16,10 @@ import time
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from tests.unit import test_shading_refinement as scenes
+from tests.unit import test_relief as scenes
 from vermilion.detail.relief import combine as combination
+from vermilion.detail.relief import high_pass as detail
 from vermilion.detail.relief import relief
-from vermilion.detail.relief import short_range as detail
 from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.geometry.mesh import triangle_normals, vertex_normals
 

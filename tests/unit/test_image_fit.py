@@ -12,10 +12,11 @@ from vermilion.appearance.samples import SurfaceSamples, sample_skin
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.ablations import ablation_rows
 from vermilion.tracking.image_fit.appearance_frames import choose_appearance_frames
+from vermilion.tracking.image_fit.chunk import FrameChunk, fit_frames
 from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
 from vermilion.tracking.image_fit.smooth_over_time import smooth_over_time
-from vermilion.tracking.image_fit.take import fit_frames, learn_appearance
+from vermilion.tracking.image_fit.take import learn_appearance
 from vermilion.tracking.landmark_fit.pose import rotation_of
 from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 from vermilion.tracking.settings import LandmarkFitSettings
@@ -101,7 +102,10 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
     face = start.face(samples)
     images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     problem = FrameProblem(face, appearance, SETTINGS, 0.5)
-    found = fit_frames(start, np.ones(N_FRAMES, dtype=bool), lambda row: images[row], problem, 1.0)
+    valid = np.ones(N_FRAMES, dtype=bool)
+    found = fit_frames(
+        FrameChunk(start, valid, appearance, face, lambda row: images[row], 1.0), problem
+    )
     refined = take_positions(start, found["x"])
     before = np.linalg.norm(in_pixels(off) - in_pixels(truth), axis=2).mean()
     after = np.linalg.norm(refined - in_pixels(truth), axis=2).mean()
@@ -124,9 +128,9 @@ def take_positions(start, x):
 def test_frames_that_are_not_tracked_keep_the_landmark_fit(scene):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
-    problem = FrameProblem(start.face(samples), appearance, SETTINGS, 0.5)
-    none = np.zeros(N_FRAMES, dtype=bool)
-    found = fit_frames(start, none, lambda row: None, problem, 1.0)
+    face, none = start.face(samples), np.zeros(N_FRAMES, dtype=bool)
+    chunk = FrameChunk(start, none, appearance, face, lambda row: None, 1.0)
+    found = fit_frames(chunk, FrameProblem(face, appearance, SETTINGS, 0.5))
     assert np.array_equal(found["x"], start.x) and not found["refined"].any()
 
 

@@ -7,11 +7,8 @@ import pytest
 
 from tests.unit.image_fit_scene import CAMERA, dome, image_of, mesh_of, motion
 from vermilion.appearance.samples import sample_skin
-from vermilion.tracking.identity.joint_identity import (
-    IdentityImageSettings,
-    _Round,
-    fit_joint_identity,
-)
+from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
+from vermilion.tracking.identity.joint_identity import _JointProblem, fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import (
     IdentityProblem,
     IdentitySettings,
@@ -75,7 +72,7 @@ def test_images_bring_the_person_nearer_than_landmarks_that_are_off(fitted):
 
 
 def test_every_frame_is_explained_better(fitted):
-    for before, after in fitted[2].sheet:
+    for before, after in fitted[2].residuals:
         assert photometric_residual(*after[:2]) < 0.8 * photometric_residual(*before[:2])
 
 
@@ -83,7 +80,7 @@ def test_a_step_goes_downhill_all_the_way():
     model, problem, images = scene()
     frames, shared = problem.solve()
     settings = IdentityImageSettings(spacing_mm=4.0, pixel_mm=2.0, strength=300.0)
-    held = _Round(
+    held = _JointProblem(
         model, problem, sample_skin(model, 4.0), images, [CAMERA] * N_FRAMES, settings, frames,
         shared,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Settings of the fits from plain values, as a configuration section holds them."""
+"""Settings of the landmark fits from the plain values of their configuration sections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vermilion.tracking.landmark_fit.observation import LandmarkNoise
 def landmark_fit_settings(
     fit: dict[str, Any], motion: dict[str, Any] | None = None
 ) -> LandmarkFitSettings:
-    """Of the sections `tracking.fit` and `tracking.motion`."""
+    """Settings of the sections `tracking.fit` and `tracking.motion`."""
     motion = {k: v for k, v in (motion or {}).items() if k != "max_reprojection"}
     noise = LandmarkNoise(**fit["noise"], robust_sigmas=fit["robust_sigmas"])
     return LandmarkFitSettings(
@@ -21,7 +21,7 @@ def landmark_fit_settings(
 
 
 def identity_settings(fit: dict[str, Any], identity: dict[str, Any]) -> IdentitySettings:
-    """Of the sections `tracking.fit` and `tracking.identity`."""
+    """Settings of the sections `tracking.fit` and `tracking.identity`."""
     return IdentitySettings(
         fit=landmark_fit_settings(fit),
         bias=LandmarkNoise(**identity["bias"]),

@@ -14,9 +14,9 @@ from vermilion.tracking.result import TrackedTake
 def valid_frames(
     motion: HeadMotion, shape: LandmarkShape, focal_px: float, max_reprojection: float
 ) -> np.ndarray:
-    """Frames (F,) bool whose landmarks were found and lie near the model's.
+    """Frames (F,) bool whose landmarks were found and whose reprojection error is small enough.
 
-    Near: within `max_reprojection` inter-ocular distances, root mean square.
+    `max_reprojection` is the largest RMS error, in inter-ocular distances.
     """
     corners = shape.neutral_mm[EYE_CORNERS]
     interocular_mm = np.linalg.norm(corners[0] - corners[1])
@@ -26,7 +26,7 @@ def valid_frames(
 
 
 def quality_rows(take: TrackedTake, rows: np.ndarray) -> list[QualityRow]:
-    """Quality rows of some rows of a tracked take."""
+    """Quality rows of some rows (n,) int of a tracked take."""
     result = []
     for row in rows:
         error, valid = float(take.reprojection_px[row]), bool(take.valid[row])

@@ -16,6 +16,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.images import write_channels, write_srgb8
 from vermilion.storage.errors import InputError
+from vermilion.storage.evenly_spaced import evenly_spaced
 from vermilion.storage.files import atomic_folder
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -35,8 +36,7 @@ def main(snakemake):
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
-    count = min(cfg["detail.relief.overlay_frames"], len(params.frames))
-    shown = set(np.linspace(0, len(params.frames) - 1, count).round().astype(int).tolist())
+    shown = evenly_spaced(len(params.frames), cfg["detail.relief.overlay_frames"])
     meshes, quality, panels = [], [], []
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):

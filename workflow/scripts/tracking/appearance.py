@@ -1,4 +1,4 @@
-"""Lighting and albedo of a take from frames that are chosen by themselves."""
+"""Lighting and albedo of a take from well-fitted frames that differ in pose and expression."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The refined frames of a take, smooth over time, as the track that all later stages use."""
+"""The fitted frames of a take smoothed over time: the track that all later stages use."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ def main(snakemake):
     fit, _, start = TakeStart.load(inputs, cfg)
     names = ["x", "matrix", "right", "refined"]
     found = read_chunks(inputs.chunks, fit.frames, names)
-    # Images tell weights and depth with more noise than landmarks do: so they are smoothed more.
+    # Weights and depth are noisier from images than from landmarks: smooth them more.
     smooth = replace(start.settings, **cfg["tracking.image_fit.join"])
     x = smooth_over_time(
         found["matrix"], found["right"], found["x"], found["refined"], snakemake.params.fps, smooth

@@ -1,16 +1,16 @@
 """The identity of a subject from landmarks and images of sampled frames of its takes."""
 
-from dataclasses import fields
-
 import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.storage.evenly_spaced import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.tracking.identity.joint_identity import IdentityImageSettings, fit_joint_identity
+from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
+from vermilion.tracking.identity.joint_identity import fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import IdentityProblem
 from vermilion.tracking.identity.sampling import sample_takes
 from vermilion.tracking.image_fit.overlay import residual_sheet
@@ -19,7 +19,7 @@ from vermilion.tracking.result import Identity
 from vermilion.tracking.settings import identity_settings
 
 STEPS = ("landmarks", "with images")
-#: Frames of the overlay: no key, as another number would make all that follows the identity again.
+#: Frames of the overlay. Not a key: changing it would rerun everything that follows the identity.
 SHOWN = 4
 
 
@@ -39,16 +39,16 @@ def main(snakemake):
         sources[part.sample.name].read(part.camera.name, frame)
         for part, frame in progress(wanted, "images")
     ]
-    names = {field.name for field in fields(IdentityImageSettings)}
+    image_options = {k: v for k, v in options["images"].items() if k != "enabled"}
     joint = fit_joint_identity(
         tracker,
         IdentityProblem(tracker, samples, identity_settings(cfg["tracking.fit"], options)),
         images,
         [part.camera for part, _ in wanted],
-        IdentityImageSettings(**{k: v for k, v in options["images"].items() if k in names}),
+        IdentityImageSettings(**image_options),
     )
     sheets, residuals = [], []
-    for (part, frame), image, states in zip(wanted, images, joint.sheet, strict=True):
+    for (part, frame), image, states in zip(wanted, images, joint.residuals, strict=True):
         each = [photometric_residual(errors, trust) for errors, trust, _ in states]
         labels = [f"{step} {value:.2f}" for step, value in zip(STEPS, each, strict=True)]
         row = [(text, *state) for text, state in zip(labels, states, strict=True)]
@@ -58,9 +58,8 @@ def main(snakemake):
     fit = joint.person
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
     print(f"residual {before:.2f} to {after:.2f} display values, {len(wanted)} frames")
-    count = min(SHOWN, len(sheets))
-    shown = np.linspace(0, len(sheets) - 1, count).round().astype(int)
-    rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in np.unique(shown)]
+    shown = evenly_spaced(len(sheets), SHOWN)
+    rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in shown]
     write_srgb8(snakemake.output.overlay, tile(rows, 1))
     Identity.of(fit, tracker, samples).save(snakemake.output.identity)
 

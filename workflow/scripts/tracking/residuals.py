@@ -1,4 +1,4 @@
-"""What each step of the track leaves unexplained of a chunk's images, as tables and images."""
+"""Photometric residuals of a chunk after each step of the track, as tables and images."""
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
+from vermilion.storage.evenly_spaced import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
@@ -35,8 +36,7 @@ def main(snakemake):
         moved = read_sequence(inputs.offsets)
     at = appearance.samples.matrix(tracker.triangles, tracker.n_vertices)
     source = open_frames(params.source, *place)
-    count = min(cfg["tracking.image_fit.overlay_frames"], len(rows))
-    shown = set(np.linspace(0, len(rows) - 1, count).round().astype(int).tolist())
+    shown = evenly_spaced(len(rows), cfg["tracking.image_fit.overlay_frames"])
     tables, sheet = {step: [] for step in steps}, []
     for index, frame in enumerate(params.frames):
         try:

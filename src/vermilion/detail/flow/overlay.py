@@ -11,6 +11,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.imaging.draw import label, tile, to_display
 from vermilion.storage.errors import InputError
+from vermilion.storage.evenly_spaced import evenly_spaced
 from vermilion.tracking.overlay import crop_to_points
 
 _SQUARES = 40
@@ -41,7 +42,7 @@ def checkerboard_sheet(
 ) -> np.ndarray:
     """Some frames, a row each: the image, then the coarse (F, V, 3) and the corrected meshes."""
     tiles = []
-    for index in np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)):
+    for index in evenly_spaced(len(frames), count):
         frame = int(frames[index])
         try:
             image = to_display(read_image(frame))

@@ -1,7 +1,7 @@
-"""Who it is: identity coefficients from landmarks of frames of all of a subject's takes.
+"""The person from landmarks: identity coefficients over frames of all of a subject's takes.
 
-Identity, landmark offsets, focal lengths (where unknown), poses and weights are found together, by
-Gauss-Newton with the frames eliminated (Schur complement).
+Gauss-Newton finds identity, landmark offsets, unknown focal lengths, poses and weights together.
+The unknowns of the frames are eliminated (Schur complement).
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
 from vermilion.tracking.landmark_fit.gauss_newton import (
     NormalEquations,
@@ -24,6 +23,7 @@ from vermilion.tracking.landmark_fit.observation import (
     pose_jacobian,
     project,
     projection_jacobian,
+    require_landmarks,
     robust_cost,
     robust_weights,
     whitening,
@@ -39,15 +39,15 @@ from vermilion.tracking.landmark_fit.start import first_guess, in_chart
 
 @dataclass(frozen=True)
 class IdentitySettings:
-    """Priors of the person; the same for everybody.
+    """Priors of the person; the same for all people.
 
     Attributes:
-        fit: noise and weights, as in tracking.
-        bias: how far a person's landmarks, as the detector sees them, lie from the model's in
-            every frame alike, as fractions of the inter-ocular distance.
+        fit: noise of the landmarks and prior of the weights, as in the landmark fit.
+        bias: deviation of a person's detected landmarks from the model's that is constant over all
+            frames, as fractions of the inter-ocular distance.
         neutral_weight_sigma: deviation of the weights in a frame known to be neutral.
-        focal_sigma: deviation of the logarithm of an unknown focal length about the guess.
-        iterations: of Gauss-Newton, at most.
+        focal_sigma: deviation of the logarithm of an unknown focal length about its guess.
+        iterations: Gauss-Newton steps, at most.
     """
 
     fit: LandmarkFitSettings = field(default_factory=LandmarkFitSettings)
@@ -63,9 +63,9 @@ class TakeSample:
 
     Attributes:
         name: the take.
-        seen: its frames; those not valid are left out.
-        focal_px: known, or the guess to start from.
-        calibrated: whether it is known.
+        seen: landmarks of n frames; frames that are not valid are left out.
+        focal_px: focal length, known or first guess.
+        calibrated: whether the focal length is known.
         neutral: (n,) bool, which frames show the neutral.
     """
 
@@ -82,10 +82,10 @@ class IdentityFit:
 
     Attributes:
         identity: (I,) in standard deviations.
-        landmark_offset_mm: (66, 3) in the head frame: where the detector sees the landmarks of
-            the neutral, less where the model has them.
-        focal_px: take -> focal length, of every take.
-        reprojection_px: root mean square over all frames.
+        landmark_offset_mm: (66, 3) in the head frame: the neutral's landmarks as detected, minus
+            the model's.
+        focal_px: take -> focal length.
+        reprojection_px: RMS over all frames and all landmarks except the jaw's.
     """
 
     identity: np.ndarray
@@ -103,17 +103,16 @@ def fit_identity(
 
 
 class IdentityProblem:
-    """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (198), log focal (takes)."""
+    """The landmark energy of one person (a `GaussNewtonProblem`).
 
-    def __init__(self, model, samples, settings):
+    Unknowns: `frames` (F, 6 + K) are pose and weights of each frame; `shared` (S,) are identity (I),
+    landmark offsets (198) and the logarithm of each take's focal length.
+    """
+
+    def __init__(self, model: FaceModel, samples: list[TakeSample], settings: IdentitySettings):
         keep = [np.flatnonzero(sample.seen.valid) for sample in samples]
         counts = [len(k) for k in keep]
-        if sum(counts) == 0:
-            raise InputError(
-                "no frame with landmarks in any take",
-                "a face in at least one frame",
-                "Look at the landmark overlays; check the detector's settings.",
-            )
+        require_landmarks([sample.seen for sample in samples])
         self.samples, self.settings = samples, settings
         self.shape = LandmarkShape.of(model)
         self.identities = without_uniform_scale(landmark_identities(model), self.shape.neutral_mm)
@@ -141,7 +140,8 @@ class IdentityProblem:
         )
         self.sigma_mm = settings.fit.noise.per_landmark() * interocular_mm
 
-    def first_guess(self):
+    def first_guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frames (F, 6 + K) fitted to the mean face, and shared unknowns (S,) at their priors."""
         seen = Observations(self.image, self.trust, np.ones(self.n_frames, dtype=bool))
         rotation, translation, weights = first_guess(
             self.shape,
@@ -162,7 +162,7 @@ class IdentityProblem:
         return self.shape.neutral_mm + person + offset
 
     def focal(self, shared: np.ndarray) -> np.ndarray:
-        """(F, 1) pixels."""
+        """Focal lengths (F, 1) px of the frames, of `shared` (S,)."""
         return np.exp(shared[self.n_identity + 198 :])[self.take][:, None]
 
     def _residual(self, points: np.ndarray, focal: np.ndarray):
@@ -181,6 +181,7 @@ class IdentityProblem:
         return shared - centre
 
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
+        """Energy of `frames` (F, 6 + K) and `shared` (S,); infinite behind the camera."""
         points = self._camera_points(frames, shared)
         if (points[..., 2] <= 1.0).any():
             return np.inf
@@ -191,7 +192,7 @@ class IdentityProblem:
         return float(total)
 
     def _linearised(self, frames: np.ndarray, shared: np.ndarray):
-        """Weighted residuals (F, 132) and Jacobians by frame unknowns and by shared ones."""
+        """Weighted residuals (F, 132), Jacobians (F, 132, 6 + K) and (F, 132, S)."""
         shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
         turned, by_rotation = pose_jacobian(
             frames[:, :3], self.reference, shape.points(frames[:, N_POSE:])
@@ -220,7 +221,7 @@ class IdentityProblem:
         return residual.reshape(size), by_frame.reshape(*size, -1), by_shared.reshape(*size, -1)
 
     def normal_equations(self, frames: np.ndarray, shared: np.ndarray) -> NormalEquations:
-        """Of the energy at a state, no weight held."""
+        """The system at `frames` (F, 6 + K) and `shared` (S,), without bounds on the weights."""
         residual, by_frame, by_shared = self._linearised(frames, shared)
         blocks = np.swapaxes(by_frame, 1, 2) @ by_frame
         diagonal = np.arange(blocks.shape[1])
@@ -236,7 +237,7 @@ class IdentityProblem:
         )
 
     def newton_step(self, frames: np.ndarray, shared: np.ndarray):
-        """Gauss-Newton step with the weights that press against their bounds held."""
+        """Step of `frames` (F, 6 + K) and of `shared` (S,); weights at active bounds stay."""
         found = self.normal_equations(frames, shared)
         held = active_bounds(frames, found.frame_gradient)
         gradient = np.where(held, 0.0, found.frame_gradient)
@@ -254,9 +255,11 @@ class IdentityProblem:
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:
         """Frames (F, 6 + K) and shared unknowns (S,) from landmarks alone."""
-        return gauss_newton(self, *self.first_guess(), self.settings.iterations)
+        frames, shared = self.first_guess()
+        return gauss_newton(self, frames, shared, self.settings.iterations)
 
     def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
+        """The person of the solution `frames` (F, 6 + K) and `shared` (S,)."""
         image = project(self._camera_points(frames, shared), self.focal(shared))
         squared = ((image - self.image) ** 2).sum(axis=-1)[:, 17:]
         focal = np.exp(shared[self.n_identity + 198 :])

@@ -1,4 +1,4 @@
-"""Images of the refinement: what was estimated, and what is left unexplained."""
+"""Images of the image fit: the estimated appearance, and the errors that remain."""
 
 from __future__ import annotations
 
@@ -27,7 +27,15 @@ def samples_to_vertices(
     triangles: np.ndarray,
     count: int,
 ) -> np.ndarray:
-    """Values at the samples (N, C) as means at the vertices (V, C); the overall mean where unseen."""
+    """Weighted means (V, C) at the vertices of values at the samples; the overall mean where unseen.
+
+    Args:
+        values: (N, C) at the samples.
+        trust: (N,) weights of the samples.
+        samples: N points of the mesh.
+        triangles: (T, 3) of the mesh.
+        count: vertices of the mesh.
+    """
     at = samples.matrix(triangles, count)
     weight = at.T @ trust
     total = (trust[:, None] * values).sum(axis=0) / max(trust.sum(), 1e-9)
@@ -41,7 +49,10 @@ def appearance_image(
     """Image, model, albedo and light side by side, (h, w, 3) uint8.
 
     Args:
-        image: (h, w, 3) linear; x: (6 + K,) of its frame.
+        image: (h, w, 3) linear RGB.
+        start: the take.
+        x: (6 + K,) rotation vector, translation, weights of the image's frame.
+        appearance: of the take.
     """
     camera, triangles = start.camera, start.model.triangles
     local = start.vertices(x)
@@ -65,11 +76,11 @@ def appearance_image(
 def residual_sheet(
     rows: Sequence[tuple[str, np.ndarray, Sequence[tuple]]], camera: Camera
 ) -> np.ndarray:
-    """A row a frame, a column a step: the image, and the error at every sample by its colour.
+    """Error of every sample as a colour: a row a frame, a column a step, (h, w, 3) uint8.
 
     Args:
         rows: (name, image (h, w, 3) linear, [(label, errors (N, 3), trust (N,), place (N, 2))]);
-            places in pixels from the principal point of the ideal pinhole.
+            places in pixels from the principal point of the ideal pinhole camera.
         camera: of the images.
     """
     if not rows:

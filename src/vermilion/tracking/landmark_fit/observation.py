@@ -1,7 +1,8 @@
-"""How a model's landmarks appear in the images: residuals, their derivatives, their trust."""
+"""Observed landmarks against the model's: residuals, their derivatives, their weights."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import BROWS, EYE_LEFT, EYE_RIGHT, JAW, MOUTH, N_LANDMARKS, NOSE
+from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.pose import cross_matrix, left_jacobian, rotation_of
 
 
@@ -27,7 +29,7 @@ class LandmarkNoise:
     robust_sigmas: float = 3.0
 
     def per_landmark(self) -> np.ndarray:
-        """(66,)."""
+        """Deviations (66,), inter-ocular distances."""
         sigma = np.empty(N_LANDMARKS)
         for ids, value in (
             (JAW, self.jaw),
@@ -42,11 +44,11 @@ class LandmarkNoise:
 
 @dataclass(frozen=True)
 class Observations:
-    """Landmarks of frames relative to the principal point of an ideal pinhole camera.
+    """Landmarks of F frames relative to the principal point of an ideal pinhole camera.
 
     Attributes:
-        image: (F, 66, 2) pixels from the principal point (zero where not valid).
-        trust: (F, 66) in [0, 1]; zero where not valid.
+        image: (F, 66, 2) pixels from the principal point; zero where not valid.
+        trust: (F, 66) confidence in [0, 1]; zero where not valid.
         valid: (F,) bool.
     """
 
@@ -56,7 +58,7 @@ class Observations:
 
     @classmethod
     def of(cls, track: LandmarkTrack, camera: Camera) -> Observations:
-        """Undo the camera's distortion; x and y scaled to the x focal length."""
+        """Landmarks without the camera's distortion, x and y scaled to the x focal length."""
         valid = track.valid & np.isfinite(track.points_px).all(axis=(1, 2))
         pixels = np.where(valid[:, None, None], track.points_px, 0.5)
         _, directions = camera.rays(pixels)
@@ -65,8 +67,19 @@ class Observations:
         trust = np.clip(track.confidence, 0.0, 1.0) * valid[:, None]
         return cls(np.where(valid[:, None, None], image, 0.0), trust, valid)
 
-    def __getitem__(self, frames: np.ndarray) -> Observations:
+    def __getitem__(self, frames: np.ndarray | slice | list[int]) -> Observations:
+        """Some frames: a mask (F,) or rows (n,)."""
         return Observations(self.image[frames], self.trust[frames], self.valid[frames])
+
+
+def require_landmarks(takes: Sequence[Observations]) -> None:
+    """Raise InputError where no frame of any take has landmarks."""
+    if not any(seen.valid.any() for seen in takes):
+        raise InputError(
+            "no frame with landmarks",
+            "a face in at least one frame",
+            "Look at the landmark overlays; check the detector's settings.",
+        )
 
 
 def focal_px(camera: Camera) -> float:
@@ -75,7 +88,7 @@ def focal_px(camera: Camera) -> float:
 
 
 def with_focal(camera: Camera, focal: float | None) -> Camera:
-    """The camera with another focal length, its ratio y to x kept; the same where it is None."""
+    """The camera with another x focal length (px), its ratio of y to x kept; None changes nothing."""
     if focal is None:
         return camera
     model = camera.colmap()
@@ -86,13 +99,16 @@ def with_focal(camera: Camera, focal: float | None) -> Camera:
 
 
 def project(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
-    """Points (..., 3) in the camera frame to pixels from the principal point, (..., 2)."""
+    """Pixels (..., 2) from the principal point of `points_mm` (..., 3) in the camera frame.
+
+    `focal` (...,) is in pixels.
+    """
     focal = np.asarray(focal)[..., None] if np.ndim(focal) else focal
     return focal * points_mm[..., :2] / points_mm[..., 2:3]
 
 
 def projection_jacobian(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
-    """Derivative of `project` by the point, (..., 2, 3)."""
+    """Derivative (..., 2, 3) of `project` by `points_mm` (..., 3); `focal` (...,) in pixels."""
     x, y, z = np.moveaxis(points_mm, -1, 0)
     zero = np.zeros_like(x)
     rows = [[1 / z, zero, -x / z**2], [zero, 1 / z, -y / z**2]]
@@ -103,15 +119,16 @@ def projection_jacobian(points_mm: np.ndarray, focal: float | np.ndarray) -> np.
 def whitening(
     points_px: np.ndarray, sigma_px: np.ndarray, trust: np.ndarray, jaw_slide: float
 ) -> np.ndarray:
-    """Matrices (F, 66, 2, 2) that turn residuals into deviations.
+    """Matrices (F, 66, 2, 2) that turn residuals in pixels into standard deviations.
 
-    Landmarks of the jaw slide along its line: only the part of the residual across it counts, the
-    part along it by `jaw_slide` (0 to 1).
+    Landmarks of the jaw slide along the jaw line: the residual across the line counts in full, the
+    residual along it by `jaw_slide` (0 to 1).
 
     Args:
-        points_px: (F, 66, 2) projected model landmarks.
+        points_px: (F, 66, 2) projected landmarks of the model.
         sigma_px: (F, 66) deviations.
-        trust: (F, 66).
+        trust: (F, 66) confidence in [0, 1].
+        jaw_slide: see above.
     """
     scale = np.sqrt(trust) / sigma_px
     result = scale[..., None, None] * np.eye(2)
@@ -144,10 +161,10 @@ def pose_jacobian(
 
 
 def robust_weights(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy weights (F, 66) of whitened residuals (F, 66, 2)."""
+    """Cauchy weights (F, 66) of whitened residuals `deviations` (F, 66, 2)."""
     return 1.0 / (1.0 + (deviations**2).sum(axis=-1) / limit**2)
 
 
 def robust_cost(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy cost (F, 66) of whitened residuals, whose weights `robust_weights` are."""
+    """Cauchy cost (F, 66) of whitened residuals `deviations` (F, 66, 2); see `robust_weights`."""
     return 0.5 * limit**2 * np.log1p((deviations**2).sum(axis=-1) / limit**2)

@@ -33,7 +33,7 @@ def vector_of(rotations: np.ndarray) -> np.ndarray:
 
 
 def left_jacobian(vectors: np.ndarray) -> np.ndarray:
-    """J with exp(v + dv) = exp(J dv) exp(v), (..., 3, 3)."""
+    """Left Jacobian J (..., 3, 3) of `vectors` (..., 3): exp(v + dv) = exp(J dv) exp(v)."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
     k = cross_matrix(vectors)
     small = angle < 1e-4

@@ -1,4 +1,4 @@
-"""The face model at its landmarks: all that fitting to landmarks needs of it."""
+"""The face model at its landmarks: all that a landmark fit needs of it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,13 @@ class LandmarkShape:
         identity: np.ndarray | None = None,
         offset_mm: np.ndarray | None = None,
     ) -> LandmarkShape:
-        """Landmarks of a person; `offset_mm` (66, 3) as `Identity.landmark_offset_mm`."""
+        """Landmarks of a person.
+
+        Args:
+            model: the face model.
+            identity: (I,) in standard deviations; the mean face by default.
+            offset_mm: (66, 3) head frame, as `Identity.landmark_offset_mm`; zero by default.
+        """
         neutral = landmark_neutral(model)
         if identity is not None and len(identity):
             neutral = neutral + np.tensordot(identity, landmark_identities(model), axes=1)
@@ -41,25 +47,26 @@ class LandmarkShape:
         return len(self.expressions_mm)
 
     def points(self, weights: np.ndarray) -> np.ndarray:
-        """Landmarks (..., 66, 3) of weights (..., K)."""
+        """Landmarks (..., 66, 3) of `weights` (..., K), head frame."""
         return self.neutral_mm + np.tensordot(weights, self.expressions_mm, axes=(-1, 0))
 
 
 def landmark_neutral(model: FaceModel) -> np.ndarray:
-    """(66, 3) landmarks of the mean face."""
+    """Landmarks (66, 3) mm of the mean face, head frame."""
     return model.neutral_mm[model.landmarks].astype(np.float64)
 
 
 def landmark_identities(model: FaceModel) -> np.ndarray:
-    """(I, 66, 3) displacements at one standard deviation."""
+    """Displacements (I, 66, 3) mm of the landmarks at one standard deviation of each mode."""
     return model.identities_mm[:, model.landmarks].astype(np.float64)
 
 
 def without_uniform_scale(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
-    """Displacements (I, N, 3) less their share of uniform growth of the neutral (N, 3).
+    """`displacements_mm` (I, N, 3) without their component of uniform scale of `neutral_mm` (N, 3).
 
-    One camera cannot tell a small near head from a large far one. Left in, growth would be set by
-    what it does to the blend weights: on a smaller head the same motion needs smaller ones.
+    One camera cannot distinguish a small near head from a large far one. With scale left in, the
+    prior on the blend weights would choose it: on a smaller head the same motion needs smaller
+    weights.
     """
     centred = neutral_mm - neutral_mm.mean(axis=0)
     return (
@@ -69,6 +76,6 @@ def without_uniform_scale(displacements_mm: np.ndarray, neutral_mm: np.ndarray) 
 
 
 def uniform_scale_share(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
-    """Share (I,) of uniform growth of the neutral (N, 3) in displacements (I, N, 3)."""
+    """Uniform scale (I,) of `neutral_mm` (N, 3) contained in `displacements_mm` (I, N, 3)."""
     centred = neutral_mm - neutral_mm.mean(axis=0)
     return np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()

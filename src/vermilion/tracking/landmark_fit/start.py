@@ -1,4 +1,4 @@
-"""A first guess: scaled orthographic pose and blend weights in turns (Mono13 6.2, eqs. 6 to 8)."""
+"""First guess: scaled orthographic pose and blend weights, alternating (Mono13 6.2, eqs. 6-8)."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ def first_guess(
     weight_sigma: float,
     rounds: int = 4,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and weights of the valid frames, each by itself.
+    """Pose and weights of each frame by itself.
 
     Args:
         shape: the person's landmarks.
         seen: F frames, all valid.
         sigma: (66,) deviations of the landmarks in millimetres at the head.
-        focal: (F,) pixels.
+        focal: (F,) focal lengths, pixels.
         weight_sigma: deviation of the blend weights about zero.
+        rounds: of pose, then weights.
 
     Returns:
         rotation (F, 3, 3) camera from head; translation (F, 3) mm; weights (F, K).
@@ -61,18 +62,18 @@ def first_guess(
 
 
 def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarray:
-    """Values (M, P) of the frames `known` (M,) to all frames (n_frames, P): linear, ends held."""
+    """Values (F, P) of all frames from `values` (M, P) of frames `known` (M,): linear, ends held."""
     every = np.arange(n_frames)
     columns = [np.interp(every, known, column) for column in values.T]
     return np.stack(columns, axis=1)
 
 
 def in_chart(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (M, 3, 3) as vectors (M, 3) about their mean: R = exp(v) @ mean."""
+    """`rotations` (M, 3, 3) as rotation vectors (M, 3) about their mean (3, 3): R = exp(v) @ mean."""
     mean = mean_rotation(rotations)
     return vector_of(rotations @ mean.T), mean
 
 
 def out_of_chart(vectors: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """The inverse of `in_chart`."""
+    """Rotations (M, 3, 3) of `vectors` (M, 3) about `mean` (3, 3): the inverse of `in_chart`."""
     return rotation_of(vectors) @ mean
