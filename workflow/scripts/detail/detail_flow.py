@@ -1,4 +1,4 @@
-"""The coarse meshes of a chunk corrected by six-frame flow, their residuals and a checkerboard."""
+"""Correct the coarse meshes of a chunk by six-frame flow; residuals and a checkerboard."""
 
 from vermilion.detail.flow.chunk import correct_frames
 from vermilion.detail.flow.deformation import DeformationSettings

@@ -1,4 +1,4 @@
-"""Relief with its normals averaged over a window of frames: meshes, normal maps, residuals."""
+"""Meshes with relief, their normals averaged over a window of frames; normal maps, residuals."""
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from vermilion.detail.relief.overlay import relief_panels
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
+from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_channels, write_srgb8
 from vermilion.storage.errors import InputError
 from vermilion.storage.evenly_spaced import evenly_spaced
@@ -32,7 +33,8 @@ def main(snakemake):
     topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
     own = params.frames[0], params.frames[-1]
-    scene = ReliefScene.open(topology, inputs, params.source, place, own, cfg)
+    source = open_frames(params.source, *place)
+    scene = ReliefScene.open(topology, inputs, source, own, cfg["detail.relief.face_px"])
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]

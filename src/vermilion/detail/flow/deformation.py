@@ -18,10 +18,10 @@ class DeformationSettings:
     """How far the mesh follows the flow.
 
     Attributes:
-        mu: trust in the flow against the mesh's shape (Mono13 eq. 14).
-        spacing_px: one vertex is chosen for C in each square of this side; 0: all visible ones.
-        pose: whether the head is first moved as a whole, as the flow of the rigid face asks.
-        depth_sigma_mm: typical error of the head's distance, for that.
+        mu: weight of the flow against the mesh's shape (Mono13 eq. 14).
+        spacing_px: side of the squares in each of which one vertex follows the flow; 0: all do.
+        pose: whether the flow of the rigid face first moves the head as a whole.
+        depth_sigma_mm: typical error of the head's distance, for `pose`.
     """
 
     mu: float = 0.5
@@ -42,28 +42,31 @@ def deform_to_flow(
 ) -> np.ndarray:
     """Follow the flow where it is known, keep the shape elsewhere (Mono13 eq. 14).
 
-    Minimises |L X - L X_b|^2 + mu^2 sum_C |X_i - (X_b,i + W_i)|^2 over the positions X, L the
-    cotangent Laplacian of X_b. W is parallel to the image, so that depth stays as it is; X_b is the
-    mesh after the rigid motion, where that is asked for.
+    Minimises |L X - L X_b|^2 + mu^2 sum_C |X_i - (X_b,i + W_i)|^2 over the positions X. L is the
+    cotangent Laplacian of X_b. W is parallel to the image, so depth does not change. X_b is the mesh
+    after the rigid motion (`settings.pose`).
 
     Args:
-        vertices_mm: (V, 3) in the world.
-        flow_px: (h, w, 2) corrective flow in `camera`'s pixels; mask: (h, w) bool, where it is known.
-        visible: (V,) bool, vertices that may follow it.
+        vertices_mm: (V, 3), world.
+        triangles: (T, 3).
+        camera: of the flow.
+        flow_px: (h, w, 2) corrective flow.
+        mask: (h, w) bool, where the flow is known.
+        visible: (V,) bool, vertices that may follow the flow.
         rigid: (V,) bool, the part of the face that moves with the skull.
+        settings: how far the mesh follows the flow.
 
     Returns:
-        (V, 3) in the world; the input where no vertex is chosen.
+        (V, 3) mm, world; the input where no vertex is chosen.
     """
     pixels = np.nan_to_num(camera.project(vertices_mm), nan=-1e6)
-    places = (pixels - 0.5).astype(np.float32)[None]
-    known = cv2.remap(mask.astype(np.float32), places, None, cv2.INTER_LINEAR)[0] > 0.99
+    places = (pixels - 0.5).astype(np.float32)
+    known = _at(places, mask) > 0.99
     chosen = one_per_cell(pixels, np.flatnonzero(visible & known), settings.spacing_px)
     local = camera.to_camera(np.asarray(vertices_mm, dtype=np.float64))
     if not len(chosen):
         return np.array(vertices_mm, dtype=np.float64)
-    flow = cv2.remap(np.ascontiguousarray(flow_px, np.float32), places, None, cv2.INTER_LINEAR)[0]
-    target = _normal_plane(camera, pixels[chosen] + flow[chosen])
+    target = _normal_plane(camera, pixels[chosen] + _at(places, flow_px)[chosen])
     if settings.pose:
         firm = rigid[chosen]
         rotation, translation = rigid_motion(
@@ -77,14 +80,20 @@ def deform_to_flow(
     trust, right = np.zeros(len(local)), np.zeros((len(local), 2))
     trust[chosen] = settings.mu**2
     right[chosen] = settings.mu**2 * wanted
-    # Vertices of no triangle have no Laplacian: a trace of inertia keeps them, and the system, firm.
+    # Vertices of no triangle have no Laplacian: a small diagonal keeps the system regular.
     system = laplacian.T @ laplacian + sparse.diags(trust + 1e-9)
     local[:, :2] += CholeskyFactor(system).solve(right)
     return (local - camera.translation) @ camera.rotation
 
 
 def one_per_cell(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
-    """Of the candidates (ids into (V, 2) pixels), in each square of the image the most central."""
+    """The most central candidate in each square of the image, sorted ids (C,).
+
+    Args:
+        pixels: (V, 2) of all vertices.
+        candidates: (N,) int ids of vertices.
+        spacing_px: side of a square; 0 keeps all candidates.
+    """
     if spacing_px <= 0 or not len(candidates):
         return candidates
     cell = np.floor(pixels[candidates] / spacing_px)
@@ -92,6 +101,13 @@ def one_per_cell(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) 
     order = np.lexsort((candidates, offset, cell[:, 0], cell[:, 1]))
     _, first = np.unique(cell[order], axis=0, return_index=True)
     return np.sort(candidates[order[first]])
+
+
+def _at(places: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (h, w) or (h, w, C) at places (N, 2) in pixel indices, bilinear: (N,) or (N, C)."""
+    image = np.ascontiguousarray(values, np.float32)
+    found = cv2.remap(image, places[None], None, cv2.INTER_LINEAR)  # type: ignore[call-overload]  # the second map may be None
+    return found[0]
 
 
 def _normal_plane(camera: Camera, pixels: np.ndarray) -> np.ndarray:

@@ -27,9 +27,9 @@ class FlowCorrectionSettings:
     """How a frame is corrected.
 
     Attributes:
-        face_px: the face is never larger than this while flow is computed.
+        face_px: longest side of the face where the flow is computed.
         flow: weights of the flow.
-        deformation: how far the mesh follows it.
+        deformation: how far the mesh follows the flow.
     """
 
     face_px: int = 480
@@ -39,12 +39,12 @@ class FlowCorrectionSettings:
 
 @dataclass(frozen=True)
 class CorrectedFrame:
-    """What became of a frame.
+    """A corrected mesh and figures.
 
     Attributes:
-        vertices_mm: (V, 3) in the world.
-        before, after: mean absolute photometric residual over the face, display values 0 to 255, over
-            the pixels that both meshes texture.
+        vertices_mm: (V, 3), world.
+        before, after: mean absolute photometric residual of the two meshes, display values 0 to 255,
+            over the pixels of the face that both texture.
         flow_px: median length of the corrective flow over the face, pixels of the whole image.
     """
 
@@ -55,13 +55,13 @@ class CorrectedFrame:
 
 
 def skin_triangles(model: FaceModel) -> np.ndarray:
-    """(T,) bool: the skin of the face; the inside of the mouth shows what no texture knows."""
+    """(T,) bool: the skin of the face; the inside of the mouth is not in the first frame's texture."""
     skin = model.regions["face"] & ~model.regions["mouth_inner"]
     return skin[model.triangles].all(axis=1)
 
 
 class FlowCorrection:
-    """A take's first frame and settings; `correct` does one frame, whatever its neighbours."""
+    """Corrects the frames of a take, one at a time, with the texture of its first frame."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class FlowCorrection:
         first_mm: np.ndarray,
         settings: FlowCorrectionSettings,
     ):
-        """`first_image` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
+        """`first_image` (h, w, 3) linear and `first_mm` (V, 3) world are of the textured frame."""
         self.triangles, self.camera, self.settings = model.triangles, camera, settings
         self.face_vertices = model.regions["face"]
         self.rigid = model.regions["rigid"]
@@ -81,12 +81,12 @@ class FlowCorrection:
         self.first = FirstFrame(image, crop.camera, first_mm, self.triangles)
 
     def correct(self, images: list[np.ndarray], meshes_mm: np.ndarray) -> CorrectedFrame:
-        """Correct the middle mesh.
+        """Correct the mesh of frame t.
 
         Args:
-            images: three linear images (h, w, 3): of t, t + 1, t - 1; at an end of the take, t
-                stands in for what is missing.
-            meshes_mm: (3, V, 3) world, in the same order.
+            images: three linear images (h, w, 3), of t, t + 1, t - 1; at an end of the take, t
+                replaces the missing frame.
+            meshes_mm: (3, V, 3), world, in the same order.
         """
         meshes = np.asarray(meshes_mm, dtype=np.float64)
         crop = self._crop(meshes)

@@ -1,4 +1,4 @@
-"""One light and one albedo for a clip, from its first frames (Mono13 section 8)."""
+"""One light and one albedo for a take, from its first frames (Mono13 section 8)."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.imaging.images import srgb_to_linear
 from vermilion.storage.arrays import read_arrays, write_arrays
 
-#: Frames' worth of the skin's one colour in the albedo of a place.
+#: Weight of the skin's median colour in the albedo of a triangle, in frames.
 _PRIOR = 0.5
-_NOISE_MM = 3.0  # noise is alike over such a range
+_NOISE_MM = 3.0  # range over which the noise estimate is smoothed
 
 
 @dataclass(frozen=True)
 class ClipLight:
-    """Light and albedo that hold for all frames.
+    """Light and albedo of all frames of a take.
 
     Attributes:
-        light: (9, 3) harmonics in the camera frame, linear.
-        albedo: (Q, 3) linear, of the skin's triangles.
-        frames: (M,) int that they were learnt from.
+        light: (9, 3) harmonics in the camera frame, linear RGB.
+        albedo: (Q, 3) linear RGB of the skin's triangles.
         seen: (Q,) sum of the first frames' trust.
-        noise: (Q,) deviation of a value from frame to frame, display values.
+        noise: (Q,) deviation of a triangle's value between frames, display values.
+        frames: (M,) int numbers of the frames that they were estimated from.
     """
 
     light: np.ndarray
@@ -42,11 +42,11 @@ class ClipLight:
     frames: np.ndarray
 
     def values(self, normals: np.ndarray) -> np.ndarray:
-        """Predicted display values (Q, 3) of unit normals (Q, 3), camera frame."""
+        """Predicted display values (Q, 3) of triangles with unit `normals` (Q, 3), camera frame."""
         return to_display_values(self.albedo * irradiance(normals, self.light))
 
     def slopes(self, normals: np.ndarray) -> np.ndarray:
-        """Derivative (Q, 3) of the mean display value of a triangle by its normal."""
+        """Derivative (Q, 3) of a triangle's mean display value by its normal, at `normals` (Q, 3)."""
         linear = self.albedo * irradiance(normals, self.light)
         by_normal = np.einsum("qhk,hc->qck", harmonics_jacobian(normals), self.light)
         return np.einsum("qc,qck->qk", display_slope(linear) * self.albedo, by_normal) / 3
@@ -71,13 +71,15 @@ def estimate_light(
 ) -> ClipLight:
     """Light, albedo and noise from observations of a few frames.
 
-    The albedo is each triangle's own: what stays the same in all of these frames is paint, what
-    changes is shading. A single frame has no noise.
+    Each triangle has its own albedo: the part of its colour that is constant over the frames. The
+    rest is shading and noise. A single frame gives zero noise.
 
     Args:
         frames: numbers of the frames of `observations`.
+        observations: image at the skin's triangles in each frame.
+        topology: of the skin.
         centres_mm: (Q, 3) of the triangles in one of the frames.
-        detail_mm: of the noise counts only what changes over shorter ranges.
+        detail_mm: noise that changes over longer ranges is left out.
     """
     seen = SampleObservations(
         np.stack([srgb_to_linear(s.colours / 255) for s in observations])[:, None].astype(
@@ -95,7 +97,7 @@ def estimate_light(
         [detail((s.colours - light.values(s.normals)).mean(axis=1)) for s in observations]
     )
     squared = (seen.trust * left**2).sum(axis=0) / np.maximum(found.seen, 1e-9)
-    # A triangle's mean has taken a share of its noise along.
+    # The albedo has absorbed a share of the noise (Bessel's correction).
     share = len(observations) / max(len(observations) - 1, 1)
     near = HighPassFilter(topology.pairs, centres_mm, found.seen, _NOISE_MM).smooth(squared)
     return replace(light, noise=np.sqrt(share * np.maximum(near, 0)))

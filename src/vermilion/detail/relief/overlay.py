@@ -1,4 +1,4 @@
-"""Images of the relief: frame, smooth mesh, refined mesh, what is left unexplained."""
+"""Images of the relief: frame, smooth mesh, mesh with relief, remaining error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,12 @@ def relief_panels(
     """Four panels (480, 480, 3) uint8 of a frame.
 
     Args:
-        image: (h, w, 3) linear; smooth_mm, refined_mm: (V', 3) in the world.
+        name: of the frame.
+        image: (h, w, 3) linear RGB.
+        camera: of the image.
+        topology: of the fine meshes.
+        smooth_mm: (V', 3) smooth mesh, world.
+        refined_mm: (V', 3) mesh with relief, world.
         errors: (Q,) of the skin's triangles, display values (dark 0, red 40); NaN is grey.
     """
     shown, place = to_display(image), camera.project(refined_mm)

@@ -1,4 +1,4 @@
-"""Relief of one frame: displacements along the normals whose shading explains the image's detail."""
+"""Relief of one frame: displacements along the normals, from the detail of the image's shading."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from vermilion.geometry.sparse import CholeskyFactor
 
 _PATCH_MM2 = 4.0  # patches of this area bend independently of one another
 _SAMPLE_MM2 = 1.0  # smaller triangles are not independent measurements
-_FIRM = 1e4
+_BORDER_WEIGHT = 1e4
 _ROBUST_SIGMAS = 2.5
 
 
 @dataclass(frozen=True)
 class ReliefSettings:
-    """What relief is believed.
+    """Priors of the relief and noise of the image.
 
     Attributes:
-        detail_mm: shading that changes over longer ranges is left to light, albedo and coarse mesh.
+        detail_mm: shading that changes over longer ranges is attributed to light, albedo and the
+            coarse mesh.
         curvature_sigma: typical mean curvature of the displacement, 1 / mm.
         displacement_sigma_mm: typical displacement.
-        noise_floor: least deviation of a value (0 to 255), where the first frames show less.
-        misplaced_mm: typical error of a place on the skin: edges of paint are trusted less.
-        iterations: of Gauss-Newton.
+        noise_floor: least deviation of a value (display values, 0 to 255).
+        misplaced_mm: typical error of a place on the skin: edges of the albedo are trusted less.
+        iterations: Gauss-Newton steps.
     """
 
     detail_mm: float = 8.0
@@ -49,12 +50,20 @@ def solve_relief(
     topology: FineTopology,
     settings: ReliefSettings,
 ) -> np.ndarray:
-    """Displacements (S,) in mm of the skin (S, 3); `world_to_camera` is (3, 3).
+    """Displacements (S,) mm of the skin along its normals.
 
-    Gauss-Newton on what is left of the values once all that changes slowly is taken away (so that
-    shading gradients agree, Mono13 8, without the noise that differences of neighbours amplify),
-    with Cauchy weights, each value by its own deviation; on the mean curvature of the displacements;
-    on their size. The skin's border stays.
+    Gauss-Newton on three terms: the high-pass part of the triangles' values, with Cauchy weights and
+    a deviation for each value; the mean curvature of the displacements; their size. Comparing high-pass
+    values makes shading gradients agree (Mono13 8) without amplifying noise as differences of
+    neighbours do. The skin's border does not move.
+
+    Args:
+        skin_mm: (S, 3) smooth skin, world.
+        world_to_camera: (3, 3) rotation.
+        observed: image at the skin's triangles.
+        light: of the take.
+        topology: of the skin.
+        settings: priors and noise.
     """
     normals = vertex_normals(skin_mm, topology.skin)
     n, q = len(skin_mm), len(topology.skin)
@@ -76,7 +85,7 @@ def solve_relief(
         inner = facing @ world_to_camera.T
         error = detail((observed.colours - light.values(inner)).mean(axis=1))
         if scale is None:
-            # Relief is rare: what is off everywhere is a mesh that lies badly on the image.
+            # Relief is sparse: errors that are large everywhere come from a misaligned mesh.
             scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
             sigma = sigma * scale
         slope = light.slopes(inner) @ world_to_camera
@@ -103,7 +112,15 @@ def value_deviation(
     centres_mm: np.ndarray,
     settings: ReliefSettings,
 ) -> np.ndarray:
-    """Typical error (Q,) of the triangles' values: the clip's noise, and paint that is misplaced."""
+    """Typical error (Q,) of the triangles' values: image noise, and misplaced edges of the albedo.
+
+    Args:
+        light: of the take.
+        observed: image at the skin's triangles.
+        topology: of the skin.
+        centres_mm: (Q, 3) of the triangles.
+        settings: noise.
+    """
     shown = light.values(observed.normals).mean(axis=1)
     i, j = topology.pairs.T
     apart = np.maximum(np.linalg.norm(centres_mm[i] - centres_mm[j], axis=1), 0.2)
@@ -115,7 +132,7 @@ def value_deviation(
 
 
 def _regulariser(skin_mm, topology, settings) -> sparse.csc_matrix:
-    """(S, S): smoothness and size of the displacements, alike for any size of triangles."""
+    """(S, S): smoothness and size of the displacements, independent of the size of triangles."""
     n, edges = len(skin_mm), topology.edges
     squared = ((skin_mm[edges[:, 0]] - skin_mm[edges[:, 1]]) ** 2).sum(axis=1)
     graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
@@ -127,5 +144,8 @@ def _regulariser(skin_mm, topology, settings) -> sparse.csc_matrix:
     bend = sparse.diags(4 / mean_squared) @ (sparse.diags(1 / degree) @ graph - sparse.identity(n))
     patches = vertex_areas(skin_mm, topology.skin) / _PATCH_MM2
     bending = bend.T @ sparse.diags(patches / settings.curvature_sigma**2) @ bend
-    stay = np.where(topology.border, _FIRM, patches + 1e-6) / settings.displacement_sigma_mm**2
+    stay = (
+        np.where(topology.border, _BORDER_WEIGHT, patches + 1e-6)
+        / settings.displacement_sigma_mm**2
+    )
     return (bending + sparse.diags(stay)).tocsc()
