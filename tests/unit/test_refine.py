@@ -1,4 +1,4 @@
-"""RigRefinement of a rig over tracks: on known points, and on images with known cameras."""
+"""Refinement of a rig over tracks: on known points, and on images with known cameras."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from vermilion.capture.bundle_adjust import align_to_given
-from vermilion.capture.refine import RigRefinementSettings, refine_cameras
+from vermilion.capture.refine import refine_cameras
+from vermilion.capture.rig_poses import RigRefinementSettings
 from vermilion.capture.tracks import FeatureMatchSettings, Features
 from vermilion.geometry.camera import Camera, look_at
 

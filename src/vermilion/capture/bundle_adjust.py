@@ -1,4 +1,4 @@
-"""Bundle adjustment of a rig over tracks of unknown points, and the rig's place in the world."""
+"""Bundle adjustment of a rig over tracks of unknown points; alignment to the given poses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vermilion.geometry.camera import Camera
 
 
 def triangulate_tracks(cameras: Mapping[str, Camera], tracks: Tracks) -> np.ndarray:
-    """Point (P, 3) mm nearest to the rays of each track, in least squares."""
+    """Least-squares intersection (P, 3) mm of the rays of each track, world."""
     origins, directions = np.zeros((2, len(tracks.track), 3))
     for i, name in enumerate(tracks.cameras):
         mine = tracks.camera == i
@@ -38,31 +38,27 @@ def bundle_adjust(
     centres_mm: Mapping[str, np.ndarray] | None = None,
     shift_mm: float = 1.0,
 ) -> tuple[dict[str, Camera], np.ndarray]:
-    """Points (P, 3), and with them poses and focal lengths, of least robust reprojection error.
+    """Minimise the robust reprojection error over points, and over poses and focal lengths if free.
 
-    Where `centres_mm` (camera -> (3,)) are given, each centre is drawn to its place: a deviation of
-    `shift_mm` costs as much as one of a pixel. A rig round a small face can bend with hardly any
-    change in the images; this is what keeps it from doing so. One thread, so that the sums have
-    one order. The world is nearly free to drift: see `align_to_given`.
+    One thread, so that sums have one order and results are reproducible. The world may drift: see
+    `align_to_given`.
+
+    Args:
+        cameras: first guess.
+        tracks: observations.
+        points_mm: (P, 3) first guess, world.
+        free_poses: whether poses change.
+        free_focal: whether focal lengths change (only with `free_poses`).
+        loss_px: residual at which the robust loss turns from squared to linear.
+        centres_mm: camera -> (3,) prior of its centre, without which a rig around a small face can
+            bend with hardly any change in the images.
+        shift_mm: deviation of that prior: it costs as much as a residual of a pixel.
+
+    Returns:
+        the cameras, and points (P, 3) mm.
     """
-    model = pycolmap.Reconstruction()
     seen = np.flatnonzero(tracks.per_camera())
-    index = np.zeros(len(tracks.track), int)
-    for i in seen:
-        name, mine = tracks.cameras[i], tracks.camera == i
-        index[mine] = np.arange(mine.sum())
-        camera = cameras[name].colmap()
-        camera.camera_id = int(i) + 1
-        model.add_camera_with_trivial_rig(camera)
-        image = pycolmap.Image(
-            name=name, keypoints=tracks.pixels[mine], camera_id=int(i) + 1, image_id=int(i) + 1
-        )
-        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(cameras[name].cam_from_world))
-    order = np.argsort(tracks.track, kind="stable")
-    ends = np.cumsum(np.bincount(tracks.track))
-    for point, rows in zip(points_mm, np.split(order, ends[:-1]), strict=True):
-        elements = [pycolmap.TrackElement(int(tracks.camera[k]) + 1, int(index[k])) for k in rows]
-        model.add_point3D(point, pycolmap.Track(elements))
+    model = _reconstruction(cameras, tracks, points_mm, seen)
     options = pycolmap.BundleAdjustmentOptions()
     options.refine_focal_length = free_focal and free_poses
     options.refine_extra_params = options.refine_principal_point = False
@@ -86,8 +82,32 @@ def bundle_adjust(
     return moved, np.stack([model.points3D[k].xyz for k in sorted(model.points3D)])
 
 
+def _reconstruction(
+    cameras: Mapping[str, Camera], tracks: Tracks, points_mm: np.ndarray, seen: np.ndarray
+) -> pycolmap.Reconstruction:
+    """COLMAP's model: camera and image i + 1 of each of the cameras `seen` (n,), points (P, 3)."""
+    model = pycolmap.Reconstruction()
+    index = np.zeros(len(tracks.track), int)
+    for i in seen:
+        name, mine = tracks.cameras[i], tracks.camera == i
+        index[mine] = np.arange(mine.sum())
+        camera = cameras[name].colmap()
+        camera.camera_id = int(i) + 1
+        model.add_camera_with_trivial_rig(camera)
+        image = pycolmap.Image(
+            name=name, keypoints=tracks.pixels[mine], camera_id=int(i) + 1, image_id=int(i) + 1
+        )
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(cameras[name].cam_from_world))
+    order = np.argsort(tracks.track, kind="stable")
+    ends = np.cumsum(np.bincount(tracks.track))
+    for point, rows in zip(points_mm, np.split(order, ends[:-1]), strict=True):
+        elements = [pycolmap.TrackElement(int(tracks.camera[k]) + 1, int(index[k])) for k in rows]
+        model.add_point3D(point, pycolmap.Track(elements))
+    return model
+
+
 def _adjuster(options, config, model, centres_mm, shift_mm: float):
-    """COLMAP's adjuster; with a prior on the centres where there are some."""
+    """COLMAP's bundle adjuster, with a prior on the centres where they are given."""
     if centres_mm is None:
         return pycolmap.create_default_bundle_adjuster(options, config, model)
     priors = []
@@ -107,7 +127,10 @@ def _adjuster(options, config, model, centres_mm, shift_mm: float):
 def residuals_px(
     cameras: Mapping[str, Camera], tracks: Tracks, points_mm: np.ndarray
 ) -> np.ndarray:
-    """Distance (K,) of each observation to its point's projection; infinite behind the camera."""
+    """Distance (K,) px of each observation to its point's projection; infinite behind the camera.
+
+    `points_mm` (P, 3) are the tracks' points, world.
+    """
     distance = np.zeros(len(tracks.track))
     for i, name in enumerate(tracks.cameras):
         mine = tracks.camera == i
@@ -122,12 +145,15 @@ def align_to_given(
     turn_deg: float,
     shift_mm: float,
 ) -> dict[str, Camera]:
-    """`moved`, turned, shifted and scaled as a whole so that it fits the given poses best.
+    """`moved`, rotated, shifted and scaled as a whole to fit the given poses best.
+
+    Orientations determine the rotation that positions leave open where the cameras stand on a line.
 
     Args:
-        turn_deg, shift_mm: deviations to be expected of a given orientation and position; they
-            weigh one against the other. Orientations settle what positions leave open where the
-            cameras stand on a line.
+        given: cameras to fit.
+        moved: the same cameras, adjusted.
+        turn_deg, shift_mm: expected deviations of a given orientation and position, which weight
+            the two.
     """
     names = sorted(moved)
     old = np.stack([given[n].rotation for n in names])
@@ -135,7 +161,7 @@ def align_to_given(
     goal = np.stack([given[n].centre_mm for n in names])
     start = np.stack([moved[n].centre_mm for n in names])
     middle, target = start.mean(axis=0), goal.mean(axis=0)
-    turned = Rotation.from_matrix(old.transpose(0, 2, 1) @ new)  # what takes moved to given
+    turned = Rotation.from_matrix(old.transpose(0, 2, 1) @ new)  # rotation from moved to given
     first = turned.mean()
 
     def parts(x):

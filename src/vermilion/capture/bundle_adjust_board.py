@@ -1,8 +1,8 @@
-"""Bundle adjustment of a rig that saw a board, through COLMAP's rigs and frames.
+"""Bundle adjustment of a rig over views of a board, with COLMAP's rigs and frames.
 
-The board stands still and the rig moves round it: each moment is a COLMAP frame with a
-`rig_from_world`, the cameras are sensors with a fixed `sensor_from_rig`, and the board's corners
-are known points.
+The world is the board's frame, so the rig moves: each moment is a COLMAP frame with a
+`rig_from_world`, the cameras are sensors with a fixed `sensor_from_rig`, and the board's corners are
+known points.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from vermilion.capture.board import Corners
 
 @dataclass(frozen=True)
 class RigEstimate:
-    """Cameras of a rig and where the board was.
+    """Cameras of a rig and the board's poses.
 
     Attributes:
         cameras: name -> pycolmap camera (model and intrinsics).
@@ -40,7 +40,15 @@ def bundle_adjust_board(
     corners_mm: np.ndarray,
     refine_principal_point: bool,
 ) -> RigEstimate:
-    """Refine intrinsics, camera poses and board poses together; the corners (N, 3) are fixed."""
+    """Refine intrinsics, camera poses and board poses together.
+
+    Args:
+        estimate: first guess.
+        reference: camera whose frame is the rig's.
+        seen: corners in the views.
+        corners_mm: (N, 3) of the board, board frame; fixed.
+        refine_principal_point: whether the principal point is estimated.
+    """
     model, ids = _reconstruction(estimate, reference, seen, corners_mm)
     options = pycolmap.BundleAdjustmentOptions()
     options.refine_points3D = False
@@ -61,13 +69,12 @@ def bundle_adjust_board(
     poses = {
         name: np.eye(3, 4)
         if name == reference
-        else np.asarray(rig.sensor_from_rig(model.cameras[camera_id].sensor_id).matrix())
+        else _matrix(rig.sensor_from_rig(model.cameras[camera_id].sensor_id))
         for name, camera_id in ids.items()
     }
     moments = sorted(estimate.rig_from_board)
     boards = {
-        moment: np.asarray(model.frames[i].rig_from_world.matrix())
-        for i, moment in enumerate(moments, start=1)
+        moment: _matrix(model.frames[i].rig_from_world) for i, moment in enumerate(moments, start=1)
     }
     return RigEstimate({name: model.cameras[i] for name, i in ids.items()}, poses, boards)
 
@@ -75,12 +82,18 @@ def bundle_adjust_board(
 def reprojection(
     estimate: RigEstimate, camera: str, moment: str, corners_mm: np.ndarray
 ) -> np.ndarray:
-    """Pixels (n, 2) at which a camera should see corners (n, 3) of the board."""
+    """Expected pixels (n, 2) of the board's corners `corners_mm` (n, 3) in a camera at a moment."""
     board = estimate.rig_from_board[moment]
     pose = estimate.camera_from_rig[camera]
     in_rig = corners_mm @ board[:, :3].T + board[:, 3]
     local = in_rig @ pose[:, :3].T + pose[:, 3]
     return np.asarray(estimate.cameras[camera].img_from_cam(local))
+
+
+def _matrix(pose: pycolmap.Rigid3d | None) -> np.ndarray:
+    """(3, 4) of a pose that the reconstruction was given."""
+    assert pose is not None
+    return np.asarray(pose.matrix())
 
 
 def _reconstruction(

@@ -66,7 +66,7 @@ def solve_relief(
         settings: priors and noise.
     """
     normals = vertex_normals(skin_mm, topology.skin)
-    n, q = len(skin_mm), len(topology.skin)
+    n = len(skin_mm)
     trust = observed.trust * (light.seen > 0)
     if not trust.any():
         return np.zeros(n)
@@ -80,29 +80,44 @@ def solve_relief(
     for _ in range(settings.iterations):
         points = skin_mm + along[:, None] * normals
         cross = triangle_cross(points, topology.skin)
-        length = np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
-        facing = cross / length
-        inner = facing @ world_to_camera.T
+        inner = (cross / _lengths(cross)) @ world_to_camera.T
         error = detail((observed.colours - light.values(inner)).mean(axis=1))
         if scale is None:
             # Relief is sparse: errors that are large everywhere come from a misaligned mesh.
             scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
             sigma = sigma * scale
         slope = light.slopes(inner) @ world_to_camera
-        # The hat function of corner k has the gradient facing x (opposite edge) / (2 area).
-        corners = points[topology.skin]
-        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-        hats = np.cross(facing[:, None], opposite) / length[:, None]
-        lift = np.einsum("qk,qck->qc", facing, normals[topology.skin])
-        change = -np.einsum("qk,qck->qc", slope, hats) * lift
-        jacobian = sparse.csr_matrix(
-            (change.ravel(), (np.repeat(np.arange(q), 3), topology.skin.ravel())), shape=(q, n)
-        )
+        jacobian = _jacobian(points, cross, normals, slope, topology.skin)
         weight = worth / (sigma**2 + (error / _ROBUST_SIGMAS) ** 2)
         weighted = jacobian.T @ sparse.diags(weight)
         right = weighted @ error - stiff @ along
         along = along + CholeskyFactor((weighted @ jacobian + stiff).tocsc()).solve(right)
     return along
+
+
+def _lengths(cross: np.ndarray) -> np.ndarray:
+    """Twice the areas (Q, 1) of triangles with cross products (Q, 3)."""
+    return np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
+
+
+def _jacobian(
+    points: np.ndarray, cross: np.ndarray, normals: np.ndarray, slope: np.ndarray, skin: np.ndarray
+) -> sparse.csr_matrix:
+    """Derivative (Q, S) of the triangles' values by the displacements along the normals.
+
+    `points` and `normals` are (S, 3), `cross` and `slope` (derivative by the normal) are (Q, 3).
+    """
+    length = _lengths(cross)
+    facing = cross / length
+    # The hat function of corner k has the gradient facing x (opposite edge) / (2 area).
+    corners = points[skin]
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    hats = np.cross(facing[:, None], opposite) / length[:, None]
+    lift = np.einsum("qk,qck->qc", facing, normals[skin])
+    change = -np.einsum("qk,qck->qc", slope, hats) * lift
+    rows = np.repeat(np.arange(len(skin)), 3)
+    shape = (len(skin), len(points))
+    return sparse.csr_matrix((change.ravel(), (rows, skin.ravel())), shape=shape)
 
 
 def value_deviation(
