@@ -33,8 +33,8 @@ def bundle_adjust(
     points_mm: np.ndarray,
     *,
     free_poses: bool,
+    loss_px: float,
     free_focal: bool = False,
-    loss_px: float = 1.0,
     centres_mm: Mapping[str, np.ndarray] | None = None,
     shift_mm: float = 1.0,
 ) -> tuple[dict[str, Camera], np.ndarray]:

@@ -32,7 +32,7 @@ class Features:
 
 @dataclass(frozen=True)
 class Tracks:
-    """BoardViews of points: K observations of `count` points.
+    """Observations of points: K observations of `count` points.
 
     Attributes:
         cameras: names.

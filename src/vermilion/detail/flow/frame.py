@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,9 +32,9 @@ class FlowCorrectionSettings:
         deformation: how far the mesh follows the flow.
     """
 
-    face_px: int = 480
-    flow: FlowSettings = field(default_factory=FlowSettings)
-    deformation: DeformationSettings = field(default_factory=DeformationSettings)
+    face_px: int
+    flow: FlowSettings
+    deformation: DeformationSettings
 
 
 @dataclass(frozen=True)
