@@ -30,7 +30,7 @@ class OverlayConfig(StageConfig):
         0.35,
         ge=0.0,
         le=2.0,
-        description="Image left round the face, as a share of the face's size.",
+        description="Margin around the face, as a share of the face's size.",
     )
     opacity: float = Field(0.85, ge=0.0, le=1.0, description="Opacity of the mesh (0 to 1).")
 

@@ -38,7 +38,7 @@ class Configuration(StageConfig):
         100,
         ge=1,
         le=100_000,
-        description="Frames a job (frames). Changes no result; 100 locally, 250 to 300 on a cluster.",
+        description="Frames of a job (frames). It changes no result; 100 locally, 250 to 300 on a cluster.",
     )
     face_model: FaceModelConfig = section(FaceModelConfig, "The face model.")
     studio: StudioConfig = section(StudioConfig, "Synthetic captures (embedded default).")
@@ -49,7 +49,9 @@ class Configuration(StageConfig):
     inpaint: InpaintConfig = section(InpaintConfig, "Removal of the lip tattoo (Lips16 3.2.1).")
     landmarks: LandmarksConfig = section(LandmarksConfig, "66 landmarks a frame (Mono13 5).")
     tracking: TrackingConfig = section(TrackingConfig, "The coarse monocular track (Lips16 3.2).")
-    detail: DetailConfig = section(DetailConfig, "A finer sequence than C (Mono13 7).")
+    detail: DetailConfig = section(
+        DetailConfig, "The detailed sequence: flow and relief (Mono13 7, 8)."
+    )
     contours: ContoursConfig = section(
         ContoursConfig, "Lip contour likelihood maps (Lips16 3.2.2)."
     )

@@ -24,7 +24,7 @@ class Take:
         subject, take: names, letters, digits, `_` and `.` only.
         role: `tattoo`, `plain`, `video` or `tracked`.
         source: capture folder, frame folder or video file; `studio` for the embedded default.
-        first, last: frame numbers, both included. The first is the neutral.
+        first, last: frame numbers, both included. The first frame shows the neutral.
         fps: frames a second.
         split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
             rest trains).
@@ -58,7 +58,7 @@ class Take:
         return self.split != "train"
 
     def test_frames(self) -> list[int]:
-        """Frames that evaluation measures: held out of training, and meant as a test."""
+        """Frames that the evaluation measures: held out of training, of a take with a test split."""
         return [] if self.split == "none" else [f for f in self.frames if self.held_out(f)]
 
     def train_frames(self) -> list[int]:
