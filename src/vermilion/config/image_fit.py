@@ -11,6 +11,26 @@ from vermilion.config.base import StageConfig, section
 Counts = Annotated[list[Annotated[int, Field(ge=0, le=50)]], Field(min_length=1, max_length=6)]
 
 
+class ColourTermConfig(StageConfig):
+    """Errors of colours that compare model and image."""
+
+    sigma: float = Field(
+        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
+    )
+    robust_sigmas: float = Field(
+        2.0,
+        gt=0.1,
+        le=100,
+        description="A sample with an error of this many deviations counts half (deviations).",
+    )
+
+
+def acceleration(default: float, of: str, unit: str) -> float:
+    """A typical acceleration, of the prior over time."""
+    text = f"Typical acceleration of {of} ({unit} per second squared); smaller is smoother."
+    return Field(default, gt=0, le=1e9, description=text)
+
+
 class AppearanceConfig(StageConfig):
     """Lighting and albedo of a take, from a few automatically chosen frames."""
 
@@ -41,18 +61,9 @@ class AppearanceConfig(StageConfig):
     )
 
 
-class FrameFitConfig(StageConfig):
+class FrameFitConfig(ColourTermConfig):
     """Pose and expression of a frame: weight of the image beside the landmarks."""
 
-    sigma: float = Field(
-        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
-    )
-    robust_sigmas: float = Field(
-        2.0,
-        gt=0.1,
-        le=100,
-        description="A sample with an error of this many deviations counts half (deviations).",
-    )
     strength: float = Field(
         4000.0,
         ge=0,
@@ -86,38 +97,17 @@ class FrameFitConfig(StageConfig):
 class SmoothingConfig(StageConfig):
     """Smoothing of the fitted frames of a take over time."""
 
-    weight_acceleration: float = Field(
-        15.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a blend weight (per second squared); smaller is "
-        "smoother.",
-    )
-    translation_acceleration_mm: float = Field(
-        200.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a head (mm per second squared); smaller is smoother. "
-        "It affects mostly the depth, which images determine least.",
-    )
+    weight_acceleration: float = acceleration(15.0, "a blend weight", "1")
+    translation_acceleration_mm: float = acceleration(200.0, "a head, mostly in depth", "mm")
 
 
-class OffsetsConfig(StageConfig):
+class OffsetsConfig(ColourTermConfig):
     """Offsets of the vertices outside the model's space, parallel to the image (Lips16 3.2)."""
 
     enabled: bool = Field(False, description="Add the offsets to the meshes.")
     sigma_mm: float = Field(2.0, gt=0, le=100, description="Deviation of an offset (mm).")
     length_mm: float = Field(
         20.0, gt=0, le=1e3, description="Correlation length of the offsets (mm)."
-    )
-    sigma: float = Field(
-        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
-    )
-    robust_sigmas: float = Field(
-        2.0,
-        gt=0.1,
-        le=100,
-        description="A sample with an error of this many deviations counts half (deviations).",
     )
     strength: float = Field(
         1000.0,

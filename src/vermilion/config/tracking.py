@@ -7,7 +7,12 @@ from typing import Literal
 from pydantic import Field
 
 from vermilion.config.base import StageConfig, section
-from vermilion.config.image_fit import ImageFitConfig, OffsetsConfig
+from vermilion.config.image_fit import (
+    ColourTermConfig,
+    ImageFitConfig,
+    OffsetsConfig,
+    acceleration,
+)
 
 
 def _per_interocular(default: float, part: str) -> float:
@@ -58,7 +63,7 @@ class ModelFitConfig(StageConfig):
     )
 
 
-class IdentityImagesConfig(StageConfig):
+class IdentityImagesConfig(ColourTermConfig):
     """The person from landmarks and images: shape, albedo and light together (Lips16 3.2)."""
 
     enabled: bool = Field(
@@ -72,15 +77,6 @@ class IdentityImagesConfig(StageConfig):
     )
     pixel_mm: float = Field(
         8.0, ge=0.1, le=20, description="Pixel size of the image that is compared (mm at the face)."
-    )
-    sigma: float = Field(
-        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
-    )
-    robust_sigmas: float = Field(
-        2.0,
-        gt=0.1,
-        le=100,
-        description="A sample with an error of this many deviations counts half (deviations).",
     )
     strength: float = Field(
         10.0, ge=0, le=1e6, description="Weight of a face's image, in independent samples."
@@ -128,26 +124,9 @@ class IdentityConfig(StageConfig):
 class MotionConfig(StageConfig):
     """Pose and blend weights of each frame (Mono13 6)."""
 
-    rotation_acceleration_deg: float = Field(
-        400.0,
-        gt=0,
-        le=1e9,
-        description="Typical angular acceleration of a head (degrees per second squared); smaller "
-        "is smoother.",
-    )
-    translation_acceleration_mm: float = Field(
-        600.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a head (mm per second squared); smaller is smoother.",
-    )
-    weight_acceleration: float = Field(
-        60.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a blend weight (per second squared); smaller is "
-        "smoother.",
-    )
+    rotation_acceleration_deg: float = acceleration(400.0, "a head's rotation", "degrees")
+    translation_acceleration_mm: float = acceleration(600.0, "a head", "mm")
+    weight_acceleration: float = acceleration(60.0, "a blend weight", "1")
     iterations: int = Field(15, ge=1, le=200, description="Gauss-Newton steps, at most (count).")
     max_reprojection: float = Field(
         0.12,

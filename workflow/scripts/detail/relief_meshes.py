@@ -6,6 +6,7 @@ from vermilion.detail.relief.frames import (
     ReliefReader,
     ReliefScene,
     mean_error,
+    mesh_with_relief,
     shading_errors,
 )
 from vermilion.detail.relief.light import ClipLight

@@ -52,7 +52,7 @@ def assemble(images, masks, flows, places, terms, gradient_weight, epsilon, syst
     Args:
         images: (6, h, w, 18) channels; masks: (6, h, w, 1) float32, 1 where they may be compared.
         flows: (h, w, 5, 2) px.
-        gradient_weight: worth of gradient constancy against that of colours.
+        gradient_weight: weight of gradient constancy against colour constancy.
         system: (h, w, 10, 10), right: (h, w, 10), filled: the increments fulfil system d = right.
     """
     height, width = flows.shape[:2]

@@ -97,7 +97,7 @@ def fit_motion(
         seen: F frames.
         focal_px: of the camera.
         fps: frames a second.
-        settings: what is typical of landmarks, faces and heads.
+        settings: noise and priors.
 
     Raises:
         InputError: no frame has landmarks.
@@ -156,7 +156,7 @@ class _TakeProblem:
         return triples[:, None] * strength, first
 
     def first_guess(self) -> np.ndarray:
-        """(F, 6 + K) of each frame by itself, gaps interpolated."""
+        """(F, 6 + K) of each frame fitted independently, gaps interpolated."""
         known = np.flatnonzero(self.seen.valid)
         focal = np.full(len(known), self.focal)
         rotation, translation, weights = first_guess(

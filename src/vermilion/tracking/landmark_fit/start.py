@@ -24,7 +24,7 @@ def first_guess(
     weight_sigma: float,
     rounds: int = 4,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and weights of each frame by itself.
+    """Pose and weights of each frame, fitted independently.
 
     Args:
         shape: the person's landmarks.
