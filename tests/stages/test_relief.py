@@ -40,15 +40,15 @@ def prepare(root, sizes, missing=()):
 
 
 def run_stage(root, paths):
-    options = DetailConfig(
+    relief = DetailConfig(
         relief={"levels": 0, "light_frames": 2, "map_px": 32, "noise_floor": 0.5}
     ).relief.model_dump(mode="json")
     params = {
-        "cfg": {f"detail.relief.{key}": value for key, value in options.items()},
+        "cfg": {f"detail.relief.{key}": value for key, value in relief.items()},
         "source": str(root), "span": [0, N_FRAMES - 1],
     }  # fmt: skip
     files = {"tracker": root / "tracker.npz", "fit": root / "fit.npz", "meshes": paths}
-    out = root / "out"
+    out = root / "relief"
     files["light"] = out / "light.npz"
     place = {"subject": "s", "take": "t"}
     made = {"light": files["light"], "topology": out / "topology.obj"}
@@ -93,7 +93,7 @@ def test_wrinkle_is_found_whatever_the_chunks(tmp_path):
         return np.degrees(np.arccos(np.clip((normals * true).sum(axis=1), -1, 1)))[near].mean()
 
     assert error_deg(found) < 0.7 * error_deg(smooth)
-    out, name = tmp_path / "one" / "out", f"000000-{N_FRAMES - 1:06d}"
+    out, name = tmp_path / "one" / "relief", f"000000-{N_FRAMES - 1:06d}"
     before = read_table(out / f"before{name}.tsv", ["frame", "residual"])
     after = read_table(out / f"after{name}.tsv", ["frame", "residual"])
     assert (after["residual"][3:] < before["residual"][3:]).all()
@@ -108,7 +108,7 @@ def test_frame_without_image_is_flagged(tmp_path):
     paths = prepare(tmp_path, [N_FRAMES], missing=(3,))
     found = run_stage(tmp_path, paths)
     assert np.isfinite(found).all()
-    rows = read_table(tmp_path / "out" / f"quality{paths[0].stem}.tsv").set_index("frame")
+    rows = read_table(tmp_path / "relief" / f"quality{paths[0].stem}.tsv").set_index("frame")
     assert rows.loc[3, "valid"] == 0 and "no relief" in rows.loc[3, "reason"]
     assert rows["valid"].sum() == N_FRAMES - 1
 

@@ -13,7 +13,7 @@ from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label,
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
-from vermilion.storage.evenly_spaced import evenly_spaced
+from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
 

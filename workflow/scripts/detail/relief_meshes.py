@@ -18,8 +18,8 @@ from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_channels, write_srgb8
 from vermilion.storage.errors import InputError
-from vermilion.storage.evenly_spaced import evenly_spaced
 from vermilion.storage.files import atomic_folder
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
@@ -39,7 +39,7 @@ def main(snakemake):
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
-    shown = evenly_spaced(len(params.frames), cfg["detail.relief.overlay_frames"])
+    shown = set(evenly_spaced(len(params.frames), cfg["detail.relief.overlay_frames"]).tolist())
     meshes, quality, panels = [], [], []
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):

@@ -6,7 +6,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
-from vermilion.storage.evenly_spaced import evenly_spaced
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.tracking.identity.colour_residuals import IdentityImageSettings

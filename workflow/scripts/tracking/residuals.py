@@ -8,7 +8,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
-from vermilion.storage.evenly_spaced import evenly_spaced
+from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
@@ -36,7 +36,7 @@ def main(snakemake):
         moved = read_sequence(inputs.offsets)
     at = appearance.samples.matrix(tracker.triangles, tracker.n_vertices)
     source = open_frames(params.source, *place)
-    shown = evenly_spaced(len(rows), cfg["tracking.image_fit.overlay_frames"])
+    shown = set(evenly_spaced(len(rows), cfg["tracking.image_fit.overlay_frames"]).tolist())
     tables, sheet = {step: [] for step in steps}, []
     for index, frame in enumerate(params.frames):
         try:

@@ -11,7 +11,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.imaging.draw import label, tile, to_display
 from vermilion.storage.errors import InputError
-from vermilion.storage.evenly_spaced import evenly_spaced
+from vermilion.storage.frames import evenly_spaced
 from vermilion.tracking.overlay import crop_to_points
 
 _SQUARES = 40

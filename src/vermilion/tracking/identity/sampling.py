@@ -11,7 +11,7 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.evenly_spaced import evenly_spaced
+from vermilion.storage.frames import evenly_spaced
 from vermilion.tracking.identity.landmark_identity import TakeSample
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px
 
