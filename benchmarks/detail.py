@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from benchmarks.common import print_table, timed
-from tests.unit import test_corrective_flow as scenes
+from tests.unit import test_detail_flow as scenes
 from vermilion.detail.flow.six_frame_flow import FlowSettings, corrective_flow
 
 

@@ -20,7 +20,7 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
-from vermilion.inpaint.frame import InpaintInputs
+from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
 from vermilion.inpaint.shading import ShadingSettings
 from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 

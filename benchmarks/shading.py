@@ -17,9 +17,9 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from benchmarks.common import peak_gb, print_table, timed
-from tests.unit import test_shading_refinement as scenes
-from vermilion.detail.relief import combine, relief, short_range
-from vermilion.detail.relief.sight import Sight
+from tests.unit import test_relief as scenes
+from vermilion.detail.relief import combine, high_pass, relief
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.geometry.mesh import triangle_normals, vertex_normals
 
 SIDE = 161
@@ -37,11 +37,11 @@ def factorising_with(factor: type) -> Iterator[None]:
     """Put another factorisation in place of ours."""
     ours = relief.CholeskyFactor
     try:
-        for module in (relief, short_range, combine):
+        for module in (relief, high_pass, combine):
             module.CholeskyFactor = factor
         yield
     finally:
-        for module in (relief, short_range, combine):
+        for module in (relief, high_pass, combine):
             module.CholeskyFactor = ours
 
 
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> None:
     grain = np.random.default_rng(0).normal(size=(n, 1))
     shown = triangle_normals(moved, topology.skin) @ scenes.FACING.T
     smooth = triangle_normals(points, topology.skin) @ scenes.FACING.T
-    sight = Sight(light.values(shown) + grain, np.ones(n), smooth)
+    observed = SkinObservation(light.values(shown) + grain, np.ones(n), smooth)
     settings = relief.ReliefSettings(detail_mm=20.0)
     near = np.hypot(points[:, 0] - 5, points[:, 1]) < 12
     rows = []
@@ -68,13 +68,21 @@ def run(arguments: argparse.Namespace) -> None:
         with factorising_with(factor):
             solve = timed(
                 partial(
-                    relief.solve_relief, points, scenes.FACING, sight, light, topology, settings
+                    relief.solve_relief, points, scenes.FACING, observed, light, topology, settings
                 ),
                 warm_up=True,
             )
             after = vertex_normals(points + solve.result[:, None] * normals, topology.skin)
             join = timed(
-                partial(combine.combine, points, normals, after, topology, 0.1, solve.result),
+                partial(
+                    combine.combine_positions_and_normals,
+                    points,
+                    normals,
+                    after,
+                    topology,
+                    0.1,
+                    solve.result,
+                ),
                 warm_up=True,
             )
         rows.append({"factor": name, "relief s": solve.cpu_s, "combination s": join.cpu_s})

@@ -35,13 +35,13 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.tables import read_table
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import focal_px
-from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
+from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.settings import landmark_fit_settings
 
 _ROUNDS = 60
 
@@ -153,15 +153,15 @@ def speed(run: FinishedRun, model: FaceModel, person: Identity, fps: float, coun
     """Print core seconds a frame of the steps on `count` frames, and their ratio to the landmark fit."""
     fit, images = landmark_fit(run), run.images()
     options = TrackingConfig().model_dump(mode="json")
-    settings = fit_settings(options["fit"], options["motion"])
+    settings = landmark_fit_settings(options["fit"], options["motion"])
     start = TakeStart.of(model, person, fit, run.landmarks(), settings)
     appearance = Appearance.load(run.folder / "tracking" / "appearance.npz")
     face = start.face(appearance.samples)
-    photometric = PhotometricSettings(**options["image_fit"]["frame_fit"])
+    photometric = FrameFitSettings(**options["image_fit"]["frame_fit"])
     pixel_mm, levels = options["image_fit"]["appearance"]["pixel_mm"], len(photometric.iterations)
     problem = FrameProblem(face, appearance, photometric, settings.weight_sigma)
-    bending = LayerSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
-    layer = CorrectiveLayer(model, person.neutral_mm, face, appearance, bending)
+    bending = OffsetSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
+    layer = OffsetSolver(model, person.neutral_mm, face, appearance, bending)
 
     def view_of(row: int):
         image = images.read(fit.camera.name, int(fit.frames[row]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stages.run_script import run_script
-from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion, take_parts
+from tests.unit.image_fit_scene import CAMERA, dome, image_of, mesh_of, motion, take_parts
 from vermilion.config.tracking import TrackingConfig
 from vermilion.imaging.images import read_image, write_image
 from vermilion.storage.sequences import read_sequence

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.stages.run_script import run_script
-from tests.unit.photometric_scene import CAMERA, image_of, mesh_of, motion
+from tests.unit.image_fit_scene import CAMERA, image_of, mesh_of, motion
 from tests.unit.test_joint_identity import PERSON, model_with_identities
 from vermilion.config.tracking import TrackingConfig
 from vermilion.geometry.camera import write_cameras

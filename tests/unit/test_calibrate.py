@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vermilion.capture.board import Board, BoardDetector
-from vermilion.capture.calibrate import calibrate_rig
+from vermilion.capture.calibrate import CalibrationSettings, calibrate_rig
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.camera import Camera, look_at
 from vermilion.storage.errors import InputError
@@ -132,7 +132,7 @@ def test_corners_are_found_to_a_tenth_of_a_pixel():
 def test_a_charuco_rig_is_recovered(seen):
     truth = make_rig()
     sizes = dict.fromkeys(truth, SIZE)
-    result = calibrate_rig(BOARD, seen, sizes, "mid", "PINHOLE")
+    result = calibrate_rig(BOARD, seen, sizes, "mid", CalibrationSettings("PINHOLE"))
     assert result.reprojection_px < 0.2
     check_against_truth(result, truth, mm=0.5, deg=0.05, focal=0.003)
 
@@ -140,7 +140,9 @@ def test_a_charuco_rig_is_recovered(seen):
 def test_a_rig_with_free_distortion_measures_space(seen):
     """Decentring terms trade against principal points and turns; triangulated points do not care."""
     truth = make_rig()
-    result = calibrate_rig(BOARD, seen, dict.fromkeys(truth, SIZE), "mid", "OPENCV")
+    result = calibrate_rig(
+        BOARD, seen, dict.fromkeys(truth, SIZE), "mid", CalibrationSettings("OPENCV")
+    )
     points = np.random.default_rng(3).uniform(-60, 60, (200, 3))
     rays = {n: result.cameras[n].rays(camera.project(points)) for n, camera in truth.items()}
     found = nearest_to_rays(rays)
@@ -154,7 +156,7 @@ def test_a_checkerboard_rig_is_recovered():
     truth = {name: camera for name, camera in make_rig().items() if name != "right"}
     seen = views_of(CHECKERS, truth, 8)
     sizes = dict.fromkeys(truth, SIZE)
-    result = calibrate_rig(CHECKERS, seen, sizes, "mid", "PINHOLE", True)
+    result = calibrate_rig(CHECKERS, seen, sizes, "mid", CalibrationSettings("PINHOLE"))
     assert result.reprojection_px < 0.2
     check_against_truth(result, truth, mm=1.0, deg=0.1, focal=0.005)
 

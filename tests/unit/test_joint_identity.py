@@ -5,20 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.photometric_scene import CAMERA, dome, image_of, mesh_of, motion
+from tests.unit.image_fit_scene import CAMERA, dome, image_of, mesh_of, motion
 from vermilion.appearance.samples import sample_skin
-from vermilion.tracking.identity.joint_identity import (
-    IdentityImageSettings,
-    _Round,
-    fit_joint_identity,
-)
+from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
+from vermilion.tracking.identity.joint_identity import _JointProblem, fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import (
     IdentityProblem,
     IdentitySettings,
     TakeSample,
 )
 from vermilion.tracking.image_fit.residual import photometric_residual
-from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, focal_px
 
 PERSON = np.array([1.3, -1.0])
@@ -50,7 +47,8 @@ def scene(noise_px=3.0):
     sample = TakeSample("t", seen, focal_px(CAMERA), True, np.arange(N_FRAMES) == 0)
     loose = LandmarkNoise(0.05, 0.05, 0.05, 0.05, 0.05)
     settings = IdentitySettings(
-        fit=FitSettings(noise=loose, jaw_slide=1.0), bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2)
+        fit=LandmarkFitSettings(noise=loose, jaw_slide=1.0),
+        bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2),
     )
     images = [image_of(model, mesh) for mesh in meshes]
     return model, IdentityProblem(model, [sample], settings), images
@@ -74,7 +72,7 @@ def test_images_bring_the_person_nearer_than_landmarks_that_are_off(fitted):
 
 
 def test_every_frame_is_explained_better(fitted):
-    for before, after in fitted[2].sheet:
+    for before, after in fitted[2].residuals:
         assert photometric_residual(*after[:2]) < 0.8 * photometric_residual(*before[:2])
 
 
@@ -82,7 +80,7 @@ def test_a_step_goes_downhill_all_the_way():
     model, problem, images = scene()
     frames, shared = problem.solve()
     settings = IdentityImageSettings(spacing_mm=4.0, pixel_mm=2.0, strength=300.0)
-    held = _Round(
+    held = _JointProblem(
         model, problem, sample_skin(model, 4.0), images, [CAMERA] * N_FRAMES, settings, frames,
         shared,
     )  # fmt: skip

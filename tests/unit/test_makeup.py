@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.unit.photometric_scene import CAMERA, LIGHT, dome, image_of, mesh_of, motion, paint
+from tests.unit.image_fit_scene import CAMERA, LIGHT, dome, image_of, mesh_of, motion, paint
 from vermilion.export.makeup import MakeUp, colour_of_hex, lip_outline, lipstick, star
 
 MODEL = dome()

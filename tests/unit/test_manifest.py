@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vermilion.capture.board import Board
+from vermilion.capture.calibrate import CalibrationSettings
 from vermilion.capture.manifest import capture_manifest, load_manifest, quality_rows
 from vermilion.capture.rig import image_sizes, rig_cameras
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
@@ -111,7 +112,9 @@ def test_given_cameras_are_checked_and_kept(capture):
 
 def test_one_camera_gets_an_assumed_focal_and_several_an_error(tmp_path):
     board = Board("checkerboard", (9, 8), 20.0)
-    rig = rig_cameras(tmp_path, {"cam": (1280, 720)}, "cam", board, assumed_focal=1.2)
+    rig = rig_cameras(
+        tmp_path, {"cam": (1280, 720)}, "cam", board, CalibrationSettings(assumed_focal=1.2)
+    )
     assert rig.summary()["calibrated"] is False and rig.method == "assumed"
     assert rig.cameras["cam"].params[:2] == (1536.0, 1536.0)
     with pytest.raises(InputError, match=r"2 cameras without a calibration.*cameras/"):

@@ -9,9 +9,10 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from vermilion.capture.bundle_adjust_poses import lay_onto
-from vermilion.capture.refine import RefineSettings, refine_cameras
-from vermilion.capture.tracks import Features, MatchSettings
+from vermilion.capture.bundle_adjust import align_to_given
+from vermilion.capture.refine import refine_cameras
+from vermilion.capture.rig_poses import RigRefinementSettings
+from vermilion.capture.tracks import FeatureMatchSettings, Features
 from vermilion.geometry.camera import Camera, look_at
 
 UP = np.array([0.0, -1.0, 0.0])
@@ -89,32 +90,43 @@ def true_error_px(true, other, points) -> float:
 
 def test_poses_off_by_a_third_of_a_degree_and_a_millimetre_are_recovered(rig, points):
     given = perturbed(rig)
-    made = refine_cameras(given, images_of(rig, points, 0.1), MatchSettings(), RefineSettings())
+    made = refine_cameras(
+        given, images_of(rig, points, 0.1), FeatureMatchSettings(), RigRefinementSettings()
+    )
     assert made.applied
     assert true_error_px(rig, given, points) > 5.0
     assert true_error_px(rig, made.cameras, points) < 0.2
     assert made.after_px["median"] < 0.2 < 2.0 < made.before_px["median"]
-    again = refine_cameras(given, images_of(rig, points, 0.1), MatchSettings(), RefineSettings())
+    again = refine_cameras(
+        given, images_of(rig, points, 0.1), FeatureMatchSettings(), RigRefinementSettings()
+    )
     for name, camera in made.cameras.items():
         assert np.array_equal(camera.cam_from_world, again.cameras[name].cam_from_world)
         assert camera.params == given[name].params
 
 
 def test_exact_cameras_are_left_alone(rig, points):
-    made = refine_cameras(rig, images_of(rig, points, 0.3), MatchSettings(), RefineSettings())
+    made = refine_cameras(
+        rig, images_of(rig, points, 0.3), FeatureMatchSettings(), RigRefinementSettings()
+    )
     assert not made.applied and "are good" in made.reason
     assert all(made.cameras[name] is camera for name, camera in rig.items())
 
 
 def test_exact_cameras_are_not_replaced_even_when_refinement_is_asked_for(rig, points):
     images = images_of(rig, points, 0.3)
-    made = refine_cameras(rig, images, MatchSettings(), RefineSettings(), only_if_off=False)
+    made = refine_cameras(
+        rig, images, FeatureMatchSettings(), RigRefinementSettings(), only_if_off=False
+    )
     assert not made.applied and "no clear gain" in made.reason
 
 
 def test_too_few_features_say_so(rig, points):
     made = refine_cameras(
-        perturbed(rig), images_of(rig, points[:40], 0.1), MatchSettings(), RefineSettings()
+        perturbed(rig),
+        images_of(rig, points[:40], 0.1),
+        FeatureMatchSettings(),
+        RigRefinementSettings(),
     )
     assert not made.applied and "at least 100 are needed" in made.reason
 
@@ -127,7 +139,7 @@ def test_a_rig_laid_onto_another_takes_its_place_and_size(rig):
         rotation = camera.rotation @ turn.T
         pose = np.concatenate([rotation, (-rotation @ centre)[:, None]], axis=1)
         moved[name] = replace(camera, cam_from_world=pose)
-    laid = lay_onto(rig, moved, 0.3, 1.0)
+    laid = align_to_given(rig, moved, 0.3, 1.0)
     for name, camera in rig.items():
         assert np.abs(laid[name].centre_mm - camera.centre_mm).max() < 1e-4  # mm
         assert np.abs(laid[name].rotation - camera.rotation).max() < 1e-7

@@ -11,9 +11,13 @@ from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.storage.errors import InputError
 from vermilion.tracking.identity.landmark_identity import IdentitySettings, TakeSample, fit_identity
 from vermilion.tracking.identity.sampling import spread_frames
-from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise, Observations, project
-from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
+from vermilion.tracking.landmark_fit.shape import (
+    LandmarkShape,
+    landmark_identities,
+    without_uniform_scale,
+)
 
 MODEL = synthetic_model()
 PERSON = np.array([1.2, -0.8, 0.5, 1.0])
@@ -35,7 +39,7 @@ def tight():
     """Priors for landmarks that are exact."""
     exact = LandmarkNoise(0.002, 0.002, 0.002, 0.002, 0.002)
     return IdentitySettings(
-        fit=FitSettings(noise=exact, weight_sigma=5.0, jaw_slide=1.0),
+        fit=LandmarkFitSettings(noise=exact, weight_sigma=5.0, jaw_slide=1.0),
         bias=exact,
         focal_sigma=0.5,
         iterations=200,
@@ -44,9 +48,11 @@ def tight():
 
 def test_the_person_comes_back_from_clean_landmarks():
     found = fit_identity(MODEL, [sample()], tight())
-    wanted = np.tensordot(PERSON, without_size(landmark_identities(MODEL), MODEL.neutral_mm), 1)
+    wanted = np.tensordot(
+        PERSON, without_uniform_scale(landmark_identities(MODEL), MODEL.neutral_mm), 1
+    )
     got = np.tensordot(
-        found.identity, without_size(landmark_identities(MODEL), MODEL.neutral_mm), 1
+        found.identity, without_uniform_scale(landmark_identities(MODEL), MODEL.neutral_mm), 1
     )
     assert np.abs(got - wanted).mean() < 0.25  # mm
     assert found.reprojection_px < 0.3
@@ -84,7 +90,7 @@ def test_no_landmarks_in_any_take_is_an_error():
 def test_uniform_growth_is_taken_out():
     centred = MODEL.neutral_mm - MODEL.neutral_mm.mean(axis=0)
     growth = 0.05 * centred[None]
-    assert np.allclose(without_size(growth, MODEL.neutral_mm), 0, atol=1e-12)
+    assert np.allclose(without_uniform_scale(growth, MODEL.neutral_mm), 0, atol=1e-12)
     corners = MODEL.neutral_mm[EYE_CORNERS]
     assert np.linalg.norm(corners[0] - corners[1]) == pytest.approx(92.0)
 

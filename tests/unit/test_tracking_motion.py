@@ -6,13 +6,13 @@ import pytest
 from tests.unit.synthetic_face import synthetic_model
 from vermilion.geometry.rotations import rotation_matrix, rotation_vector
 from vermilion.storage.errors import InputError
-from vermilion.tracking.landmark_fit.expression import FitSettings, fit_motion
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings, fit_motion
 from vermilion.tracking.landmark_fit.observation import Observations, project
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 
 FOCAL_PX, FPS, N_FRAMES = 1400.0, 30.0, 40
 SHAPE = LandmarkShape.of(synthetic_model())
-LOOSE = FitSettings(
+LOOSE = LandmarkFitSettings(
     weight_sigma=100.0,
     weight_acceleration=1e9,
     rotation_acceleration_deg=1e9,
@@ -85,7 +85,7 @@ def test_smoothing_has_no_lag():
     """The same frames in reverse give the same motion in reverse."""
     truth = true_motion()
     seen = images(*truth, noise_px=2.0)
-    settings = FitSettings(weight_acceleration=10.0, iterations=60, tolerance_mm=1e-5)
+    settings = LandmarkFitSettings(weight_acceleration=10.0, iterations=60, tolerance_mm=1e-5)
     found = fit_motion(SHAPE, seen, FOCAL_PX, FPS, settings)
     back = fit_motion(SHAPE, seen[np.arange(N_FRAMES)[::-1]], FOCAL_PX, FPS, settings)
     assert np.abs(found.weights - back.weights[::-1]).max() < 1e-3

@@ -26,11 +26,11 @@ def test_a_scan_changes_the_model_of_its_subject_alone(fresh_project):
             if name.removeprefix("image_") == rule:
                 inputs["s1" if "/s1" in made else "s2"] += given
         assert "subjects/s1/tracker.npz" in inputs["s1"], rule
-        assert "face/tracker.npz" not in inputs["s1"], rule
-        assert "face/tracker.npz" in inputs["s2"], rule
+        assert "face_model/tracker.npz" not in inputs["s1"], rule
+        assert "face_model/tracker.npz" in inputs["s2"], rule
         assert "s1/tracker.npz" not in inputs["s2"], rule
     basis = [given for rule, given, _ in jobs if rule == "features"]
-    assert basis and all("face/tracker.npz" in given for given in basis)
+    assert basis and all("face_model/tracker.npz" in given for given in basis)
 
 
 @pytest.mark.slow

@@ -1,9 +1,9 @@
 """Lighting and albedo of a take from a few of its frames (Lips16 3.2).
 
-Light and albedo can be told apart only by what is usual of skin: it has one colour but for a few
-places (lips, brows, a beard). So the light is first fitted to skin of one colour, with Cauchy
-weights, under which those places count little; the albedo is what is left, and both are then
-improved in turns, the albedo drawn half-way to the one colour while the light is fitted.
+Images alone do not separate light from albedo. The prior is that skin has one colour except in a
+few places (lips, brows, a beard). The light is first fitted to skin of one colour, with Cauchy
+weights that discount those places. The albedo explains the rest. Light and albedo then alternate;
+the light is fitted to the mean of the albedo and the one colour.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.storage.arrays import read_arrays, write_arrays
 
-#: Mean linear albedo that skin is taken to have: scales light against albedo, which no image tells.
+#: Assumed mean linear albedo of skin: images do not determine the scale of light against albedo.
 SKIN_ALBEDO = 0.35
 _ROUNDS = 4
-#: A colour this far off counts half (display values, 0 to 255).
+#: A colour that is wrong by this much counts half (display values, 0 to 255).
 _ROBUST = 12.0
 
 
 @dataclass(frozen=True)
-class Sightings:
-    """What M frames show at N samples at L resolutions.
+class SampleObservations:
+    """Colours of N samples in M frames at L resolutions.
 
     Attributes:
         colours: (M, L, N, 3) linear RGB.
-        normals: (M, N, 3) unit, camera frame.
+        normals: (M, N, 3) unit normals, camera frame.
         trust: (M, N) in [0, 1]; zero where not seen.
     """
 
@@ -42,15 +42,16 @@ class Sightings:
 
 @dataclass(frozen=True)
 class Appearance:
-    """Light, and the skin's colour at each sample.
+    """Light, and the skin's albedo at each sample.
 
     Attributes:
-        frames: (M,) int that it was estimated from.
-        triangle, barycentric: of the samples.
+        frames: (M,) int numbers of the frames that it was estimated from.
+        triangle, barycentric: (N,) and (N, 3) of the samples.
         light: (9, 3) harmonics in the camera frame, linear RGB on a white surface.
-        albedo: (L, N, 3) linear, as seen at each resolution, finest first.
-        spread: (N,) deviation over the frames at the finest resolution, display values (0 to 255).
-        seen: (N,) sum of the frames' trust; samples never seen have 0.
+        albedo: (L, N, 3) linear RGB at each resolution, finest first.
+        spread: (N,) mean absolute error over the frames at the finest resolution, display values
+            (0 to 255).
+        seen: (N,) sum of the frames' trust; 0 for samples never seen.
     """
 
     frames: np.ndarray
@@ -63,10 +64,11 @@ class Appearance:
 
     @property
     def samples(self) -> SurfacePoints:
+        """Places of the samples on the mesh."""
         return SurfacePoints(self.triangle, self.barycentric)
 
     def colours(self, normals: np.ndarray, level: int = 0) -> np.ndarray:
-        """Predicted linear RGB (N, 3) of the samples with unit normals (N, 3), camera frame."""
+        """Predicted linear RGB (N, 3) of samples with unit `normals` (N, 3), camera frame."""
         return self.albedo[level] * irradiance(normals, self.light)
 
     def save(self, path: str | Path) -> None:
@@ -80,29 +82,31 @@ class Appearance:
 
 
 def estimate_appearance(
-    frames: np.ndarray, samples: SurfacePoints, seen: Sightings, albedo_prior: float
+    frames: np.ndarray, samples: SurfacePoints, seen: SampleObservations, albedo_prior: float
 ) -> Appearance:
-    """Light and albedo from sightings of some frames.
+    """Light and albedo from the samples' colours in some frames.
 
     Args:
-        frames: (M,) their numbers.
-        albedo_prior: how many frames' worth the skin's one colour counts at each sample.
+        frames: (M,) int numbers.
+        samples: N places on the mesh.
+        seen: their colours in these frames.
+        albedo_prior: weight of the skin's median colour at each sample, in frames.
     """
     finest, trust = seen.colours[:, 0], seen.trust
     basis = harmonics(seen.normals)
-    skin = middle_colour(finest, trust)
+    skin = median_colour(finest, trust)
     light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
     for _ in range(_ROUNDS):
         shading = irradiance(seen.normals, light)
-        skin = middle_colour(finest / shading, trust)
+        skin = median_colour(finest / shading, trust)
         albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
-    # No image tells a bright light on dark skin from a dim one on fair skin, nor their colours:
-    # the light on the face is white on the whole, the skin as bright as skin is.
+    # Images do not distinguish a bright light on dark skin from a dim light on fair skin, nor their
+    # colours: the mean light on the face is set to white, the skin's mean albedo to SKIN_ALBEDO.
     weight = trust / max(trust.sum(), 1e-12)
     mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
     light = light / mean
-    skin = middle_colour(finest / irradiance(seen.normals, light), trust)
+    skin = median_colour(finest / irradiance(seen.normals, light), trust)
     light = light * (skin.mean() / SKIN_ALBEDO)
     skin = skin * (SKIN_ALBEDO / skin.mean())
     shading = irradiance(seen.normals, light)
@@ -120,13 +124,13 @@ def estimate_appearance(
     )
 
 
-def middle_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
-    """Median colour (3,) of what is well seen."""
+def median_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
+    """Median (3,) of `colours` (..., 3) where `trust` (...,) is high."""
     return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
 
 
 def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
-    """(9, 3) by iteratively reweighted least squares."""
+    """Light (9, 3) by iteratively reweighted least squares."""
     seen = trust > 0
     rows, weights = basis[seen], trust[seen]
     values = colours[seen]
@@ -147,8 +151,24 @@ def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
     return light
 
 
-def fit_albedo(colours, shading, trust, skin, prior, rounds: int = 4):
-    """(N, 3) albedo under a known light, drawn to `skin` (3,) by `prior` frames' worth."""
+def fit_albedo(
+    colours: np.ndarray,
+    shading: np.ndarray,
+    trust: np.ndarray,
+    skin: np.ndarray,
+    prior: float,
+    rounds: int = 4,
+) -> np.ndarray:
+    """Albedo (N, 3) under a known light, with a prior of one colour.
+
+    Args:
+        colours: (M, N, 3) linear RGB of N samples in M frames.
+        shading: (M, N, 3) light on the samples, linear RGB.
+        trust: (M, N) weights.
+        skin: (3,) colour of the prior.
+        prior: weight of the prior, in frames.
+        rounds: of reweighted least squares.
+    """
     robust = np.ones_like(colours)
     level = (skin * shading.reshape(-1, 3).mean(axis=0)) ** 2 / skin**2
     for _ in range(rounds):

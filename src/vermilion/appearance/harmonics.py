@@ -1,4 +1,4 @@
-"""Light on a matt surface as nine spherical harmonics of its normal (Ramamoorthi, Hanrahan 2001)."""
+"""Light on a Lambertian surface: nine spherical harmonics of its normal (Ramamoorthi 2001)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def harmonics(normals: np.ndarray) -> np.ndarray:
 
 
 def harmonics_jacobian(normals: np.ndarray) -> np.ndarray:
-    """Derivative (..., 9, 3) of `harmonics` by the normal."""
+    """Derivative (..., 9, 3) of `harmonics` by `normals` (..., 3)."""
     x, y, z = np.moveaxis(normals, -1, 0)
     o, i = np.zeros_like(x), np.ones_like(x)
     rows = [
@@ -29,10 +29,9 @@ def harmonics_jacobian(normals: np.ndarray) -> np.ndarray:
 
 
 def irradiance(normals: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Light (..., 3) RGB on a white surface with `normals` (..., 3); never quite dark.
+    """Light (..., 3), linear RGB, on a white surface with unit `normals` (..., 3).
 
-    Args:
-        light: (9, 3) coefficients.
+    `light` (9, 3) are coefficients. Values have a positive floor, because others divide by them.
     """
     floor = 0.02 * np.abs(light[0])
     return np.maximum(harmonics(normals) @ light, floor)

@@ -1,4 +1,4 @@
-"""The model at its samples: points, normals, and how both change with the blend weights."""
+"""The model at samples of its skin: points, normals, and their derivatives by the blend weights."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from vermilion.geometry.surface_points import SurfacePoints
 
 @dataclass(frozen=True)
 class SampledFace:
-    """One person's face at N samples, linear in the weights, in the head frame.
+    """One person's face at N samples, linear in the weights, head frame.
 
     Attributes:
-        neutral_mm: (N, 3).
-        expressions_mm: (N, 3, K) float32.
+        neutral_mm: (N, 3) points of the neutral.
+        expressions_mm: (N, 3, K) float32, displacements at weight 1.
         neutral_normals: (N, 3) not normalised (area-weighted, mm2).
         expression_normals: (N, 3, K) float32, their change at weight 1, to first order.
     """
@@ -35,7 +35,14 @@ class SampledFace:
         samples: SurfacePoints,
         displacements_mm: np.ndarray | None = None,
     ) -> SampledFace:
-        """At `neutral_mm` (V, 3); `displacements_mm` (K, V, 3), by default the expressions."""
+        """Sample a face.
+
+        Args:
+            model: topology and expressions.
+            neutral_mm: (V, 3) the person's neutral, head frame.
+            samples: N places on the mesh.
+            displacements_mm: (K, V, 3) shapes at weight 1; the model's expressions by default.
+        """
         shapes = model.expressions_mm if displacements_mm is None else displacements_mm
         at = samples.matrix(model.triangles, model.n_vertices)
         to_vertices = at @ incidence(model.triangles, model.n_vertices)
@@ -48,18 +55,19 @@ class SampledFace:
         return cls(at @ neutral_mm, moved.astype(np.float32), cross, change.astype(np.float32))
 
     def points(self, weights: np.ndarray) -> np.ndarray:
-        """(N, 3) of weights (K,)."""
+        """Points (N, 3) mm of `weights` (K,)."""
         return self.neutral_mm + self.expressions_mm @ weights
 
     def normals(self, weights: np.ndarray) -> np.ndarray:
-        """(N, 3) unit normals of weights (K,), to first order."""
+        """Unit normals (N, 3) of `weights` (K,), to first order."""
         return normalised(self.neutral_normals + self.expression_normals @ weights)
 
     def through_normals(self, weights: np.ndarray, by_normal: np.ndarray) -> np.ndarray:
-        """Derivative (N, C, K) by the weights of what depends on the normals.
+        """Derivative (N, C, K) by the weights of C functions of the unit normal (chain rule).
 
         Args:
-            by_normal: (N, C, 3) its derivative by the unit normal.
+            weights: (K,) where to differentiate.
+            by_normal: (N, C, 3) derivative of the functions by the unit normal.
         """
         cross = self.neutral_normals + self.expression_normals @ weights
         length = np.linalg.norm(cross, axis=1)[:, None, None]
@@ -79,7 +87,13 @@ class SampledFace:
 def cross_change(
     vertices_mm: np.ndarray, triangles: np.ndarray, displacement_mm: np.ndarray
 ) -> np.ndarray:
-    """First-order change (T, 3) of `triangle_cross` under a displacement (V, 3)."""
+    """First-order change (T, 3) of `triangle_cross` under a displacement.
+
+    Args:
+        vertices_mm: (V, 3).
+        triangles: (T, 3).
+        displacement_mm: (V, 3).
+    """
     a, b, c = (vertices_mm[triangles[:, k]] for k in range(3))
     da, db, dc = (displacement_mm[triangles[:, k]].astype(np.float64) for k in range(3))
     return np.cross(db - da, c - a) + np.cross(b - a, dc - da)

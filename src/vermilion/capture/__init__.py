@@ -1,1 +1,1 @@
-"""Captures as they come: checked images and calibrated cameras (Lips16 3.1)."""
+"""Checked images and calibrated cameras of a capture (Lips16 3.1)."""

@@ -1,4 +1,4 @@
-"""Calibration boards: ChArUco and checkerboard, and the corners seen in an image."""
+"""Calibration boards, ChArUco and checkerboard, and their corners in an image."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Board:
         square_mm: edge of a square.
         marker_mm: edge of a marker (ChArUco).
         dictionary: name of the marker dictionary in `cv2.aruco` (ChArUco).
-        legacy: pattern of OpenCV before 4.6 (ChArUco with an even number of rows).
+        legacy: has the pattern of OpenCV before 4.6 (ChArUco with an even number of rows).
     """
 
     kind: Literal["charuco", "checkerboard"]
@@ -34,14 +34,14 @@ class Board:
 
     @property
     def corners_mm(self) -> np.ndarray:
-        """Inner corners (N, 3), row by row; the index is the corner's id."""
+        """Inner corners (N, 3) mm, board frame, row by row; the index is the corner's id."""
         columns, rows = self.squares
         x, y = np.meshgrid(np.arange(1, columns), np.arange(1, rows))
         flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
         return flat * float(self.square_mm)
 
     def charuco(self) -> cv2.aruco.CharucoBoard:
-        """OpenCV's board."""
+        """The ChArUco board of OpenCV."""
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
         board = cv2.aruco.CharucoBoard(self.squares, self.square_mm, self.marker_mm, dictionary)
         board.setLegacyPattern(self.legacy)
@@ -74,15 +74,10 @@ class BoardDetector:
             self._detector.setDetectorParameters(parameters)
 
     def detect(self, grey: np.ndarray) -> Corners:
-        """Corners of the board in (h, w) uint8; none where the board is not found."""
-        ids, points = self._charuco(grey) if self._detector else self._checkerboard(grey)
-        return Corners(ids, points + 0.5)
-
-    def _charuco(self, grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points, ids, _, _ = self._detector.detectBoard(grey)
-        if ids is None or len(ids) < 6:
-            return np.zeros(0, dtype=int), np.zeros((0, 2))
-        return np.asarray(ids).reshape(-1), np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        """Corners of the board in `grey` (h, w) uint8; none where the board is not found."""
+        detector = self._detector
+        found = _charuco(detector, grey) if detector is not None else self._checkerboard(grey)
+        return Corners(found[0], found[1] + 0.5)
 
     def _checkerboard(self, grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         columns, rows = self.board.squares[0] - 1, self.board.squares[1] - 1
@@ -91,11 +86,21 @@ class BoardDetector:
         if not found:
             return np.zeros(0, dtype=int), np.zeros((0, 2))
         grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
-        # A board turned by half a turn looks the same but for its colours: the square below right
-        # of corner 0 is black.
+        # A board rotated by 180 degrees differs only in its colours: the square below right of
+        # corner 0 is black.
         if not _first_square_is_black(grey, grid):
             grid = grid[::-1, ::-1]
         return np.arange(columns * rows), grid.reshape(-1, 2)
+
+
+def _charuco(
+    detector: cv2.aruco.CharucoDetector, grey: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ids (n,) and places (n, 2), pixel indices, of the corners of a ChArUco board."""
+    points, ids, _, _ = detector.detectBoard(grey)
+    if ids is None or len(ids) < 6:
+        return np.zeros(0, dtype=int), np.zeros((0, 2))
+    return np.asarray(ids).reshape(-1), np.asarray(points, dtype=np.float64).reshape(-1, 2)
 
 
 def _first_square_is_black(grey: np.ndarray, grid: np.ndarray) -> bool:

@@ -1,136 +1,184 @@
-"""Bundle adjustment of a rig that saw a board, through COLMAP's rigs and frames.
-
-The board stands still and the rig moves round it: each moment is a COLMAP frame with a
-`rig_from_world`, the cameras are sensors with a fixed `sensor_from_rig`, and the board's corners
-are known points.
-"""
+"""Bundle adjustment of a rig over tracks of unknown points; alignment to the given poses."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pycolmap
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
-from vermilion.capture.board import Corners
+from vermilion.capture.tracks import Tracks
+from vermilion.geometry.camera import Camera
 
 
-@dataclass(frozen=True)
-class RigEstimate:
-    """Cameras of a rig and where the board was.
+def triangulate_tracks(cameras: Mapping[str, Camera], tracks: Tracks) -> np.ndarray:
+    """Least-squares intersection (P, 3) mm of the rays of each track, world."""
+    origins, directions = np.zeros((2, len(tracks.track), 3))
+    for i, name in enumerate(tracks.cameras):
+        mine = tracks.camera == i
+        origins[mine], directions[mine] = cameras[name].rays(tracks.pixels[mine])
+    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    left, right = np.zeros((tracks.count, 3, 3)), np.zeros((tracks.count, 3))
+    np.add.at(left, tracks.track, across)
+    np.add.at(right, tracks.track, np.einsum("kij,kj->ki", across, origins))
+    return np.linalg.solve(left + 1e-12 * np.eye(3), right[..., None])[..., 0]
 
-    Attributes:
-        cameras: name -> pycolmap camera (model and intrinsics).
-        camera_from_rig: name -> (3, 4); identity for the reference camera.
-        rig_from_board: moment -> (3, 4), millimetres.
+
+def bundle_adjust(
+    cameras: Mapping[str, Camera],
+    tracks: Tracks,
+    points_mm: np.ndarray,
+    *,
+    free_poses: bool,
+    loss_px: float,
+    free_focal: bool = False,
+    centres_mm: Mapping[str, np.ndarray] | None = None,
+    shift_mm: float = 1.0,
+) -> tuple[dict[str, Camera], np.ndarray]:
+    """Minimise the robust reprojection error over points, and over poses and focal lengths if free.
+
+    One thread, so that sums have one order and results are reproducible. The world may drift: see
+    `align_to_given`.
+
+    Args:
+        cameras: first guess.
+        tracks: observations.
+        points_mm: (P, 3) first guess, world.
+        free_poses: whether poses change.
+        free_focal: whether focal lengths change (only with `free_poses`).
+        loss_px: residual at which the robust loss turns from squared to linear.
+        centres_mm: camera -> (3,) prior of its centre, without which a rig around a small face can
+            bend with hardly any change in the images.
+        shift_mm: deviation of that prior: it costs as much as a residual of a pixel.
+
+    Returns:
+        the cameras, and points (P, 3) mm.
     """
-
-    cameras: dict[str, pycolmap.Camera]
-    camera_from_rig: dict[str, np.ndarray]
-    rig_from_board: dict[str, np.ndarray]
-
-
-Observations = dict[str, dict[str, Corners]]  # camera -> moment -> corners
-
-
-def adjust_rig(
-    estimate: RigEstimate,
-    reference: str,
-    seen: Observations,
-    corners_mm: np.ndarray,
-    refine_principal_point: bool,
-) -> RigEstimate:
-    """Refine intrinsics, camera poses and board poses together; the corners (N, 3) are fixed."""
-    model, ids = _reconstruction(estimate, reference, seen, corners_mm)
+    seen = np.flatnonzero(tracks.per_camera())
+    model = _reconstruction(cameras, tracks, points_mm, seen)
     options = pycolmap.BundleAdjustmentOptions()
-    options.refine_points3D = False
-    options.refine_principal_point = refine_principal_point
+    options.refine_focal_length = free_focal and free_poses
+    options.refine_extra_params = options.refine_principal_point = False
+    options.refine_rig_from_world = free_poses
     options.print_summary = False
     options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
-    options.ceres.loss_function_scale = 1.0
-    options.ceres.solver_options.num_threads = 1  # the sums' order decides the last digits
-    options.ceres.solver_options.max_num_iterations = 200
-    options.ceres.solver_options.function_tolerance = 1e-10
+    options.ceres.loss_function_scale = loss_px
+    options.ceres.solver_options.num_threads = 1
+    options.ceres.solver_options.max_num_iterations = 100
+    options.ceres.solver_options.function_tolerance = 1e-9
     config = pycolmap.BundleAdjustmentConfig()
-    for image_id in model.images:
-        config.add_image(image_id)
-    for point_id in model.points3D:
-        config.add_constant_point(point_id)
-    pycolmap.create_default_bundle_adjuster(options, config, model).solve()
-    rig = model.rigs[1]
-    poses = {
-        name: np.eye(3, 4)
-        if name == reference
-        else np.asarray(rig.sensor_from_rig(model.cameras[camera_id].sensor_id).matrix())
-        for name, camera_id in ids.items()
-    }
-    moments = sorted(estimate.rig_from_board)
-    boards = {
-        moment: np.asarray(model.frames[i].rig_from_world.matrix())
-        for i, moment in enumerate(moments, start=1)
-    }
-    return RigEstimate({name: model.cameras[i] for name, i in ids.items()}, poses, boards)
-
-
-def reprojection(
-    estimate: RigEstimate, camera: str, moment: str, corners_mm: np.ndarray
-) -> np.ndarray:
-    """Pixels (n, 2) at which a camera should see corners (n, 3) of the board."""
-    board = estimate.rig_from_board[moment]
-    pose = estimate.camera_from_rig[camera]
-    in_rig = corners_mm @ board[:, :3].T + board[:, 3]
-    local = in_rig @ pose[:, :3].T + pose[:, 3]
-    return np.asarray(estimate.cameras[camera].img_from_cam(local))
+    for i in seen:
+        config.add_image(int(i) + 1)
+    _adjuster(options, config, model, centres_mm if free_poses else None, shift_mm).solve()
+    moved = dict(cameras)
+    for i in seen:
+        pose = np.asarray(model.images[int(i) + 1].cam_from_world().matrix())
+        params = tuple(float(p) for p in model.cameras[int(i) + 1].params)
+        name = tracks.cameras[i]
+        moved[name] = replace(cameras[name], cam_from_world=pose, params=params)
+    return moved, np.stack([model.points3D[k].xyz for k in sorted(model.points3D)])
 
 
 def _reconstruction(
-    estimate: RigEstimate, reference: str, seen: Observations, corners_mm: np.ndarray
-) -> tuple[pycolmap.Reconstruction, dict[str, int]]:
+    cameras: Mapping[str, Camera], tracks: Tracks, points_mm: np.ndarray, seen: np.ndarray
+) -> pycolmap.Reconstruction:
+    """COLMAP's model: camera and image i + 1 of each of the cameras `seen` (n,), points (P, 3)."""
     model = pycolmap.Reconstruction()
-    names = [reference, *sorted(set(estimate.cameras) - {reference})]
-    ids = {name: i for i, name in enumerate(names, start=1)}
-    rig = pycolmap.Rig(rig_id=1)
-    for name, camera_id in ids.items():
-        camera = estimate.cameras[name]
-        copy = pycolmap.Camera(
-            model=camera.model_name,
-            width=camera.width,
-            height=camera.height,
-            params=list(camera.params),
-            camera_id=camera_id,
+    index = np.zeros(len(tracks.track), int)
+    for i in seen:
+        name, mine = tracks.cameras[i], tracks.camera == i
+        index[mine] = np.arange(mine.sum())
+        camera = cameras[name].colmap()
+        camera.camera_id = int(i) + 1
+        model.add_camera_with_trivial_rig(camera)
+        image = pycolmap.Image(
+            name=name, keypoints=tracks.pixels[mine], camera_id=int(i) + 1, image_id=int(i) + 1
         )
-        model.add_camera(copy)
-        if name == reference:
-            rig.add_ref_sensor(copy.sensor_id)
-        else:
-            rig.add_sensor(copy.sensor_id, pycolmap.Rigid3d(estimate.camera_from_rig[name]))
-    model.add_rig(rig)
-    for corner_id, xyz in enumerate(corners_mm, start=1):
-        model.add_point3D_with_id(corner_id, pycolmap.Point3D(xyz=xyz))
-    image_id = 0
-    for frame_id, moment in enumerate(sorted(estimate.rig_from_board), start=1):
-        frame = pycolmap.Frame(frame_id=frame_id, rig_id=1)
-        frame.rig_from_world = pycolmap.Rigid3d(estimate.rig_from_board[moment])
-        images = []
-        for name in names:
-            if moment not in seen[name]:
-                continue
-            image_id += 1
-            keypoints = np.ascontiguousarray(seen[name][moment].points_px)
-            image = pycolmap.Image(
-                name=f"{name}/{moment}",
-                keypoints=keypoints,
-                camera_id=ids[name],
-                image_id=image_id,
-            )
-            image.frame_id = frame_id
-            frame.add_data_id(image.data_id)
-            images.append((image, seen[name][moment].ids))
-        model.add_frame(frame)
-        for image, corner_ids in images:
-            model.add_image(image)
-            for index, corner in enumerate(corner_ids):
-                element = pycolmap.TrackElement(image.image_id, index)
-                model.add_observation(int(corner) + 1, element)
-        model.register_frame(frame_id)
-    return model, ids
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(cameras[name].cam_from_world))
+    order = np.argsort(tracks.track, kind="stable")
+    ends = np.cumsum(np.bincount(tracks.track))
+    for point, rows in zip(points_mm, np.split(order, ends[:-1]), strict=True):
+        elements = [pycolmap.TrackElement(int(tracks.camera[k]) + 1, int(index[k])) for k in rows]
+        model.add_point3D(point, pycolmap.Track(elements))
+    return model
+
+
+def _adjuster(options, config, model, centres_mm, shift_mm: float):
+    """COLMAP's bundle adjuster, with a prior on the centres where they are given."""
+    if centres_mm is None:
+        return pycolmap.create_default_bundle_adjuster(options, config, model)
+    priors = []
+    for image in model.images.values():
+        prior = pycolmap.PosePrior()
+        prior.pose_prior_id = image.image_id
+        prior.corr_data_id = image.data_id
+        prior.position = centres_mm[image.name]
+        prior.position_covariance = np.eye(3) * shift_mm**2
+        prior.coordinate_system = pycolmap.PosePriorCoordinateSystem.CARTESIAN
+        priors.append(prior)
+    prior_options = pycolmap.PosePriorBundleAdjustmentOptions()
+    prior_options.alignment_ransac.random_seed = 0
+    return pycolmap.create_pose_prior_bundle_adjuster(options, prior_options, config, priors, model)
+
+
+def residuals_px(
+    cameras: Mapping[str, Camera], tracks: Tracks, points_mm: np.ndarray
+) -> np.ndarray:
+    """Distance (K,) px of each observation to its point's projection; infinite behind the camera.
+
+    `points_mm` (P, 3) are the tracks' points, world.
+    """
+    distance = np.zeros(len(tracks.track))
+    for i, name in enumerate(tracks.cameras):
+        mine = tracks.camera == i
+        expected = cameras[name].project(points_mm[tracks.track[mine]])
+        distance[mine] = np.linalg.norm(expected - tracks.pixels[mine], axis=1)
+    return np.nan_to_num(distance, nan=np.inf)
+
+
+def align_to_given(
+    given: Mapping[str, Camera],
+    moved: Mapping[str, Camera],
+    turn_deg: float,
+    shift_mm: float,
+) -> dict[str, Camera]:
+    """`moved`, rotated, shifted and scaled as a whole to fit the given poses best.
+
+    Orientations determine the rotation that positions leave open where the cameras stand on a line.
+
+    Args:
+        given: cameras to fit.
+        moved: the same cameras, adjusted.
+        turn_deg, shift_mm: expected deviations of a given orientation and position, which weight
+            the two.
+    """
+    names = sorted(moved)
+    old = np.stack([given[n].rotation for n in names])
+    new = np.stack([moved[n].rotation for n in names])
+    goal = np.stack([given[n].centre_mm for n in names])
+    start = np.stack([moved[n].centre_mm for n in names])
+    middle, target = start.mean(axis=0), goal.mean(axis=0)
+    turned = Rotation.from_matrix(old.transpose(0, 2, 1) @ new)  # rotation from moved to given
+    first = turned.mean()
+
+    def parts(x):
+        return Rotation.from_rotvec(x[:3]) * first, np.exp(x[3]), x[4:] + target
+
+    def misfit(x):
+        rotation, scale, place = parts(x)
+        centres = scale * rotation.apply(start - middle) + place
+        angles = (rotation * turned.inv()).as_rotvec(degrees=True)
+        return np.concatenate([((centres - goal) / shift_mm).ravel(), (angles / turn_deg).ravel()])
+
+    x = least_squares(misfit, np.zeros(7), x_scale=[1e-3] * 4 + [1.0] * 3, xtol=1e-14).x
+    rotation, scale, place = parts(x)
+    laid = {}
+    for name, centre in zip(names, start, strict=True):
+        pose = moved[name].rotation @ rotation.as_matrix().T
+        there = scale * rotation.apply(centre - middle) + place
+        pose = np.concatenate([pose, (-pose @ there)[:, None]], axis=1)
+        laid[name] = replace(moved[name], cam_from_world=pose)
+    return laid

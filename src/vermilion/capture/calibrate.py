@@ -1,22 +1,45 @@
-"""Calibration of a rig from views of a board: intrinsics, then poses, then bundle adjustment."""
+"""Calibration of a rig from views of a board: intrinsics, poses, then bundle adjustment."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 import pycolmap
 
 from vermilion.capture.board import Board
-from vermilion.capture.bundle_adjust import Observations, RigEstimate, adjust_rig, reprojection
+from vermilion.capture.bundle_adjust_board import (
+    BoardViews,
+    RigEstimate,
+    bundle_adjust_board,
+    reprojection,
+)
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import mean_rotation
 from vermilion.storage.errors import InputError
 
 #: Views of the board that one camera needs.
 MIN_VIEWS = 3
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """How cameras are calibrated.
+
+    Attributes:
+        camera_model: COLMAP model, `PINHOLE` or `OPENCV` (two radial, two tangential terms).
+        refine_principal_point: whether it is estimated, or stays at the middle of the image.
+        max_view_px: views with a larger RMS after the first adjustment are dropped once.
+        assumed_focal: focal length of a single camera without calibration, in image widths.
+    """
+
+    camera_model: str = "OPENCV"
+    refine_principal_point: bool = True
+    max_view_px: float = 2.0
+    assumed_focal: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -30,7 +53,7 @@ class Calibration:
         reprojection_px: RMS over all corners of all views.
         camera_reprojection_px: the same a camera.
         residuals: camera -> moment -> (seen (n, 2), expected (n, 2)) pixels, for overlays.
-        dropped: (camera, moment) views left out because the board was not found or not fitted.
+        dropped: (camera, moment) of the views in which the board was not found or did not fit.
     """
 
     cameras: dict[str, Camera]
@@ -42,37 +65,40 @@ class Calibration:
 
 def calibrate_rig(
     board: Board,
-    seen: Observations,
+    seen: BoardViews,
     sizes: dict[str, tuple[int, int]],
     reference: str,
-    model: str = "OPENCV",
-    refine_principal_point: bool = True,
-    max_view_px: float = 2.0,
-    **place,
+    settings: CalibrationSettings | None = None,
+    **place: Any,
 ) -> Calibration:
     """Calibrate all cameras of a rig.
 
     Args:
+        board: the calibration board.
         seen: camera -> moment -> corners. Views of the same name are of the same moment.
         sizes: camera -> (width, height).
         reference: the camera whose frame becomes the world.
-        model: COLMAP model, `PINHOLE` or `OPENCV` (two radial, two tangential terms).
-        max_view_px: views with a larger RMS after the first adjustment are dropped once.
+        settings: how cameras are calibrated.
+        place: subject and take, for error messages.
 
-    Raises InputError listing every camera that saw the board too seldom or shares no moment with
-    the others.
+    Raises:
+        InputError: listing every camera that saw the board too few times or shares no moment with
+            the others.
     """
+    settings = settings or CalibrationSettings()
+    free_centre = settings.refine_principal_point
     seen, dropped = _usable(seen)
     _check_enough(seen, sizes, place)
     corners = board.corners_mm
     cameras, boards = {}, {}
     for name, views in sorted(seen.items()):
         cameras[name], boards[name] = _intrinsics(
-            views, corners, sizes[name], model, refine_principal_point
+            views, corners, sizes[name], settings.camera_model, free_centre
         )
-    estimate = _join(cameras, boards, reference, place)
-    estimate = adjust_rig(estimate, reference, seen, corners, refine_principal_point)
-    bad = {key for key, rms in _view_rms(estimate, seen, corners).items() if rms > max_view_px}
+    estimate = _chained_poses(cameras, boards, reference, place)
+    estimate = bundle_adjust_board(estimate, reference, seen, corners, free_centre)
+    rms_of = _view_rms(estimate, seen, corners)
+    bad = {key for key, rms in rms_of.items() if rms > settings.max_view_px}
     if bad:
         dropped += sorted(bad)
         seen = {
@@ -83,11 +109,11 @@ def calibrate_rig(
         moments = {m for views in seen.values() for m in views}
         kept = {m: p for m, p in estimate.rig_from_board.items() if m in moments}
         estimate = RigEstimate(estimate.cameras, estimate.camera_from_rig, kept)
-        estimate = adjust_rig(estimate, reference, seen, corners, refine_principal_point)
+        estimate = bundle_adjust_board(estimate, reference, seen, corners, free_centre)
     return _calibration(estimate, seen, corners, tuple(dropped))
 
 
-def _usable(seen: Observations) -> tuple[Observations, list[tuple[str, str]]]:
+def _usable(seen: BoardViews) -> tuple[BoardViews, list[tuple[str, str]]]:
     dropped = [(c, m) for c, views in seen.items() for m, v in views.items() if len(v.ids) < 6]
     kept = {
         c: {m: v for m, v in sorted(views.items()) if len(v.ids) >= 6} for c, views in seen.items()
@@ -95,7 +121,7 @@ def _usable(seen: Observations) -> tuple[Observations, list[tuple[str, str]]]:
     return kept, sorted(dropped)
 
 
-def _check_enough(seen: Observations, sizes: dict[str, tuple[int, int]], place: dict) -> None:
+def _check_enough(seen: BoardViews, sizes: dict[str, tuple[int, int]], place: dict) -> None:
     few = {name: len(seen.get(name, {})) for name in sizes if len(seen.get(name, {})) < MIN_VIEWS}
     if few:
         listing = ", ".join(f"{name} {count}" for name, count in sorted(few.items()))
@@ -134,7 +160,7 @@ def _intrinsics(
     return camera, poses
 
 
-def _join(
+def _chained_poses(
     cameras: dict[str, pycolmap.Camera],
     boards: dict[str, dict[str, np.ndarray]],
     reference: str,
@@ -159,10 +185,10 @@ def _join(
                 **place,
             )
         _, known, name = max(links, key=lambda link: (link[0], link[1], link[2]))
-        shared = sorted(set(boards[known]) & set(boards[name]))
-        relative = [_compose(boards[name][m], _inverse(boards[known][m])) for m in shared]
+        moments = sorted(set(boards[known]) & set(boards[name]))
+        relative = [_compose(boards[name][m], _inverse(boards[known][m])) for m in moments]
         poses[name] = _compose(_mean_pose(relative), poses[known])
-    rig_from_board = {}
+    rig_from_board: dict[str, np.ndarray] = {}
     for name in [reference, *sorted(set(cameras) - {reference})]:
         for moment, pose in boards[name].items():
             rig_from_board.setdefault(moment, _compose(_inverse(poses[name]), pose))
@@ -170,7 +196,7 @@ def _join(
 
 
 def _mean_pose(poses: Sequence[np.ndarray]) -> np.ndarray:
-    """Chordal mean of rotations, median of translations."""
+    """(3, 4): chordal mean of the rotations, median of the translations."""
     rotation = mean_rotation(np.stack([pose[:, :3] for pose in poses]))
     return np.concatenate(
         [rotation, np.median([pose[:, 3] for pose in poses], axis=0)[:, None]], axis=1
@@ -188,7 +214,7 @@ def _inverse(pose: np.ndarray) -> np.ndarray:
 
 
 def _view_rms(
-    estimate: RigEstimate, seen: Observations, corners: np.ndarray
+    estimate: RigEstimate, seen: BoardViews, corners: np.ndarray
 ) -> dict[tuple[str, str], float]:
     return {
         (name, moment): _rms(
@@ -205,7 +231,7 @@ def _rms(differences: np.ndarray) -> float:
 
 def _calibration(
     estimate: RigEstimate,
-    seen: Observations,
+    seen: BoardViews,
     corners: np.ndarray,
     dropped: tuple[tuple[str, str], ...],
 ) -> Calibration:

@@ -1,4 +1,4 @@
-"""Images of what the capture stage found: contact sheets, seen against expected corners."""
+"""Images of the capture stage: contact sheets, seen and expected corners."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 def contact_sheet(
     images: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
 ) -> np.ndarray:
-    """One linear image a camera with its name, (h, w, 3) uint8; None is drawn as missing."""
+    """One image a camera with its name, (h, w, 3) uint8.
+
+    `images` maps a camera to its image (h, w, 3), linear RGB, or to None, which is drawn as missing.
+    """
     tiles = []
     for name, linear in images.items():
         if linear is None:
@@ -33,7 +36,12 @@ def calibration_sheet(
     """The worst view of each camera with seen (green) and expected (red) corners.
 
     Args:
-        views: camera -> moment -> linear image; only the moment drawn is read.
+        calibration: of the rig.
+        views: camera -> moment -> image (h, w, 3), linear RGB; only the worst moment is used.
+        height_px: of a view.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     tiles = []
     for name in calibration.cameras:
@@ -59,8 +67,12 @@ def refinement_sheet(
     """Held-out points as seen (green) and as expected by the given (red) and refined cameras (blue).
 
     Args:
-        images: camera -> linear image, or None.
-        shown, moved: of a `Refinement`.
+        images: camera -> image (h, w, 3), linear RGB, or None.
+        shown, moved: of a `RigRefinement`.
+        height_px: of an image.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     tiles = []
     for name, linear in images.items():

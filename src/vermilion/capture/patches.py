@@ -1,8 +1,8 @@
-"""Observations of a track to a small part of a pixel: least-squares matching of surface patches.
+"""Subpixel observations of a track: least-squares matching of surface patches (Gruen 1985).
 
-A feature detector places a point in each image by itself, a quarter of a pixel off. Here the patch
-round a point in one image is laid on the tangent plane of the surface, projected into each other
-image of the track, and shifted there until the images agree (Gruen 1985).
+A feature detector finds a point in each image independently, with an error of about a quarter of a
+pixel. Here the patch around a point in one image is put on the tangent plane of the surface, projected
+into each other image of the track, and shifted there until the images agree.
 """
 
 from __future__ import annotations
@@ -32,16 +32,18 @@ def align_patches(
     max_shift_px: float = 2.0,
     min_correlation: float = 0.8,
 ) -> Tracks:
-    """The tracks with every observation aligned to that of the camera that looks most frontally.
+    """The tracks with every observation aligned to that of the most frontal camera.
 
     Args:
-        cameras: good to some pixels.
-        points_mm: (P, 3) of the tracks.
+        cameras: accurate to a few pixels.
+        tracks: observations.
+        points_mm: (P, 3) of the tracks, world.
         greys: the images.
         radius_px: half the width of a patch.
-        neighbours: points that settle a tangent plane.
-        max_shift_px: observations whose patch lies farther from its point are dropped;
-            so are those whose patches correlate less than `min_correlation`.
+        neighbours: nearest points that determine a tangent plane.
+        rounds: Gauss-Newton steps of the alignment.
+        max_shift_px: observations whose patch moves farther are dropped.
+        min_correlation: observations whose patches correlate less are dropped.
     """
     normals = _normals(tracks, points_mm, neighbours)
     towards = np.stack([cameras[n].centre_mm for n in tracks.cameras])[tracks.camera]
@@ -61,7 +63,7 @@ def align_patches(
         rows = others[(cells == np.array([[frame], [source], [target]])).all(axis=0)]
         a, b = (tracks.cameras[k] for k in (source, target))
         at = base[tracks.track[rows]]
-        where, patch = _laid_over(
+        where, patch = _projected_patches(
             cameras[a], cameras[b], greys[frame][a], tracks.pixels[at],
             points_mm[tracks.track[rows]], normals[tracks.track[rows]], radius_px,
         )  # fmt: skip
@@ -84,15 +86,15 @@ def _normals(tracks: Tracks, points_mm: np.ndarray, neighbours: int) -> np.ndarr
         near = cKDTree(points_mm[rows]).query(points_mm[rows], k=min(neighbours, len(rows)))[1]
         around = points_mm[rows][near.reshape(len(rows), -1)]
         around = around - np.median(around, axis=1, keepdims=True)
-        # a wrong point is far away: weights fall with the distance, so that it turns no plane
+        # Wrong points are far away: weights that fall with the distance make the plane robust.
         distance = np.linalg.norm(around, axis=2, keepdims=True)
         around = around / np.maximum(distance, np.median(distance, axis=1, keepdims=True)) ** 2
         normals[rows] = np.linalg.svd(around, full_matrices=False)[2][:, -1]
     return normals
 
 
-def _laid_over(source, target, grey, pixels, points_mm, normals, radius_px):
-    """Patches of an image over tangent planes: ((N, S, 2) target pixels, (N, S) values)."""
+def _projected_patches(source, target, grey, pixels, points_mm, normals, radius_px):
+    """Patches of an image on tangent planes: target pixels (N, S, 2) and values (N, S)."""
     step = np.arange(-radius_px, radius_px + 1)
     grid = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2)
     at = pixels[:, None] + grid
@@ -108,7 +110,7 @@ def _laid_over(source, target, grey, pixels, points_mm, normals, radius_px):
 
 
 def _shifts(grey, where, patch, rounds, max_shift_px):
-    """Shift (N, 2) px that makes an image agree with patches up to gain and offset; agreement."""
+    """Shifts (N, 2) px that make an image agree with patches up to gain and offset; correlation."""
     y_slope, x_slope = np.gradient(grey.astype(np.float32))
     wanted = _standardised(patch)[0]
     shift = np.zeros((len(where), 2))
@@ -117,7 +119,7 @@ def _shifts(grey, where, patch, rounds, max_shift_px):
         values, scale = _standardised(_sampled(grey, at))
         slopes = np.stack([_sampled(s, at) for s in (x_slope, y_slope)], axis=2)
         slopes = (slopes - slopes.mean(axis=1, keepdims=True)) / scale[..., None]
-        # the part of a slope along the patch itself is gain
+        # The component of a slope along the patch itself is gain.
         slopes = (
             slopes - (slopes * values[..., None]).sum(axis=1, keepdims=True) * values[..., None]
         )

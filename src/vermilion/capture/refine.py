@@ -1,9 +1,10 @@
-"""Refinement of a rig whose calibration is off, from the images of the take themselves.
+"""Refinement of a rig whose calibration is off, from the images of the take.
 
-Features are matched near the epipolar lines of the given poses, the poses adjusted over their
-tracks, and the matching repeated with the better poses. Patches of the surface round the points,
-matched by least squares, bring the observations and with them the poses to a small part of a pixel.
-Part of the tracks is held out: what is said of the result is measured on these.
+1. Match features near the epipolar lines of the given poses; adjust the poses over their tracks.
+2. Match again with the better poses and a finer gate; adjust again.
+3. Align patches of the surface around the points by least squares; adjust over these observations.
+
+Part of the tracks is held out: the reported errors are measured on them.
 """
 
 from __future__ import annotations
@@ -12,16 +13,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from vermilion.capture.bundle_adjust_poses import adjust, lay_onto, midpoints, residuals_px
-from vermilion.capture.patches import Greys, align_patches
+from vermilion.capture.bundle_adjust import (
+    align_to_given,
+    bundle_adjust,
+    residuals_px,
+    triangulate_tracks,
+)
+from vermilion.capture.patches import Greys
+from vermilion.capture.rig_poses import (
+    RigRefinementSettings,
+    aligned_tracks,
+    connected_cameras,
+    consistent_tracks,
+    solve_patches,
+    solve_poses,
+)
 from vermilion.capture.tracks import (
+    FeatureMatchSettings,
     Features,
-    MatchSettings,
     Tracks,
-    join_tracks,
+    concatenate_tracks,
     match_frame,
 )
 from vermilion.geometry.camera import Camera
@@ -30,53 +42,17 @@ MultiviewImages = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its
 
 
 @dataclass(frozen=True)
-class RefineSettings:
-    """How a rig is refined.
-
-    Attributes:
-        fine_gate_deg: as `MatchSettings.gate_deg`, once the poses are better.
-        max_residual_px: observations that lie farther from their point at the end are outliers.
-        loss_px: residual at which the robust loss turns from squared to linear.
-        patch_radius_px: half the width of the patches that are matched last; 0 for none.
-        patch_residual_px, patch_loss_px: as the two above, over patches.
-        min_tracks: tracks without which nothing is refined.
-        min_camera_tracks: a camera with fewer keeps its given pose.
-        held_out: part of the tracks that the adjustment never sees, in (0, 1).
-        threshold_px: given cameras whose median error is below are left alone.
-        improvement: largest ratio of the held-out median errors, refined over given, at which the
-            refined cameras are taken.
-        turn_deg, shift_mm: expected error of a given pose (see `lay_onto`).
-        refine_focal: adjust focal lengths too.
-    """
-
-    fine_gate_deg: float = 0.1
-    max_residual_px: float = 1.0
-    loss_px: float = 0.3
-    patch_radius_px: int = 8
-    patch_residual_px: float = 0.3
-    patch_loss_px: float = 0.1
-    min_tracks: int = 100
-    min_camera_tracks: int = 30
-    held_out: float = 0.2
-    threshold_px: float = 1.0
-    improvement: float = 0.7
-    turn_deg: float = 0.3
-    shift_mm: float = 1.0
-    refine_focal: bool = False
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """What became of a rig.
+class RigRefinement:
+    """The result of a refinement.
 
     Attributes:
         cameras: refined, or as given.
         applied: whether they are refined.
         reason: why, or why not.
-        tracks: number of tracks adjusted and held out.
-        before_px, after_px: {median, rms} over the held-out tracks, each triangulated with those
-            cameras; the rms is of observations within 20 px, as no match is sure. Where the rig
-            was refined over patches, both are over the held-out tracks' patches.
+        tracks: numbers of tracks found, held out and adjusted.
+        before_px, after_px: {median, rms} error over the held-out tracks, triangulated with the given
+            and the refined cameras. The rms leaves out observations over 20 px, which are wrong
+            matches. A rig refined over patches is measured over the patches of the held-out tracks.
         moved: camera -> {turned_deg, moved_mm, observations}.
         shown: camera -> (seen (n, 2), given (n, 2), refined (n, 2)) pixels of the held-out tracks
             of the first frame, for overlays.
@@ -106,60 +82,86 @@ class Refinement:
 def refine_cameras(
     given: Mapping[str, Camera],
     images: MultiviewImages,
-    matching: MatchSettings,
-    settings: RefineSettings,
+    matching: FeatureMatchSettings,
+    settings: RigRefinementSettings,
     only_if_off: bool = True,
-) -> Refinement:
-    """Adjust the poses of a rig to what its images show.
+) -> RigRefinement:
+    """Adjust the poses of a rig to the images of a take.
 
-    The world stays: the refined rig is turned, shifted and scaled onto the given poses.
+    The world does not change: the refined rig is rotated, shifted and scaled onto the given poses.
+    The given cameras are returned, with the reason, where there are too few tracks, where the given
+    cameras are accurate, or where the refined cameras do not clearly reduce the held-out error.
 
     Args:
         given: the rig; any COLMAP models.
-        only_if_off: leave the rig alone where its median error is under `threshold_px`.
-
-    The given cameras come back, with the reason, where there are too few tracks, where they are
-    good already, or where the refined ones do not lower the error on held-out tracks clearly.
+        images: features of some frames.
+        matching: how features are matched.
+        settings: how poses are refined.
+        only_if_off: do not change a rig whose median error is under `threshold_px`.
     """
     given = dict(given)
     found = _match(given, images, matching)
     if found.count < settings.min_tracks:
         reason = f"{found.count} tracks; at least {settings.min_tracks} are needed"
-        return Refinement(given, False, reason, {"found": found.count})
+        return RigRefinement(given, False, reason, {"found": found.count})
     held, fitted = _split(found, settings.held_out, matching.seed)
-    expected, before = _measured(given, held, settings)
-    tracks = {"found": found.count, "held_out": held.count}
+    expected, before = _held_out_error(given, held, settings)
+    counts = {"found": found.count, "held_out": held.count}
     if only_if_off and before["median"] < settings.threshold_px:
         reason = (
             f"the given cameras are good: median error {before['median']:.2f} px, threshold "
             f"{settings.threshold_px:g} px"
         )
         shown = _shown(held, expected, None)
-        return Refinement(given, False, reason, tracks, before, None, shown=shown)
-    rough, _ = _solve(given, fitted, given, settings)
-    near = replace(matching, gate_deg=settings.fine_gate_deg)
-    again = _match(rough, _without(images, held), near)
-    cameras, used = _solve(rough, again, given, settings) if again.count else (rough, fitted)
+        return RigRefinement(given, False, reason, counts, before, None, shown=shown)
     greys = _greys(images) if settings.patch_radius_px else None
-    if greys is not None:
-        cameras, used = _solve_patches(cameras, used, given, greys, settings)
-    enough = sorted(_linked(used, settings.min_camera_tracks))
-    tracks["adjusted"] = used.count
-    if used.count < settings.min_tracks or len(enough) < 2:
+    cameras, used = _adjusted(given, fitted, _without(images, held), greys, matching, settings)
+    connected = sorted(connected_cameras(used, settings.min_camera_tracks))
+    counts["adjusted"] = used.count
+    if used.count < settings.min_tracks or len(connected) < 2:
         reason = f"{used.count} consistent tracks; at least {settings.min_tracks} are needed"
-        return Refinement(given, False, reason, tracks, before)
-    laid = lay_onto(
-        {n: given[n] for n in enough},
-        {n: cameras[n] for n in enough},
+        return RigRefinement(given, False, reason, counts, before)
+    aligned = align_to_given(
+        {n: given[n] for n in connected},
+        {n: cameras[n] for n in connected},
         settings.turn_deg,
         settings.shift_mm,
     )
-    cameras = given | laid
+    cameras = given | aligned
     if greys is not None:
-        # laid on by the refined poses, as patches start within pixels; then held against both rigs
-        held = _aligned(cameras, _consistent(cameras, held, settings), greys, settings)
-        expected, before = _measured(given, held, settings)
-    refined, after = _measured(cameras, held, settings)
+        # Patches must start within a few pixels: align them by the refined poses, then compare.
+        held = aligned_tracks(cameras, consistent_tracks(cameras, held, settings), greys, settings)
+    return _compared(given, cameras, used, held, counts, settings)
+
+
+def _adjusted(
+    given: dict[str, Camera],
+    fitted: Tracks,
+    images: MultiviewImages,
+    greys: Greys | None,
+    matching: FeatureMatchSettings,
+    settings: RigRefinementSettings,
+) -> tuple[dict[str, Camera], Tracks]:
+    """Cameras after the three steps above, and the tracks that they were adjusted over."""
+    rough, _ = solve_poses(given, fitted, given, settings)
+    again = _match(rough, images, replace(matching, gate_deg=settings.fine_gate_deg))
+    cameras, used = solve_poses(rough, again, given, settings) if again.count else (rough, fitted)
+    if greys is not None:
+        cameras, used = solve_patches(cameras, used, given, greys, settings)
+    return cameras, used
+
+
+def _compared(
+    given: dict[str, Camera],
+    cameras: dict[str, Camera],
+    used: Tracks,
+    held: Tracks,
+    counts: dict[str, int],
+    settings: RigRefinementSettings,
+) -> RigRefinement:
+    """The refined cameras, or the given ones where the held-out error is not clearly smaller."""
+    expected, before = _held_out_error(given, held, settings)
+    refined, after = _held_out_error(cameras, held, settings)
     shown = _shown(held, expected, refined)
     seen = dict(zip(used.cameras, used.per_camera(), strict=True))
     moved = {n: _movement(given[n], cameras[n]) | {"observations": int(seen[n])} for n in given}
@@ -167,16 +169,18 @@ def refine_cameras(
     change += f"{after['median']:.2f} px refined"
     if after["median"] > settings.improvement * before["median"]:
         reason = f"no clear gain: {change}"
-        return Refinement(given, False, reason, tracks, before, after, shown=shown)
-    left = sorted(set(given) - set(enough))
-    if left:
-        change += f"; too few tracks in {', '.join(left)}, kept as given"
-    return Refinement(cameras, True, change, tracks, before, after, moved, shown)
+        return RigRefinement(given, False, reason, counts, before, after, shown=shown)
+    unchanged = sorted(name for name in given if cameras[name] is given[name])
+    if unchanged:
+        change += f"; too few tracks in {', '.join(unchanged)}, kept as given"
+    return RigRefinement(cameras, True, change, counts, before, after, moved, shown)
 
 
-def _match(cameras: dict[str, Camera], images: MultiviewImages, matching: MatchSettings) -> Tracks:
+def _match(
+    cameras: dict[str, Camera], images: MultiviewImages, matching: FeatureMatchSettings
+) -> Tracks:
     frames = sorted(images)
-    return join_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
+    return concatenate_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
 
 
 def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
@@ -186,7 +190,7 @@ def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
 
 def _without(images: MultiviewImages, tracks: Tracks) -> MultiviewImages:
     """The features that are in none of these tracks."""
-    rest = {}
+    rest: dict[int, dict[str, Features]] = {}
     for frame, views in images.items():
         rest[frame] = {}
         for i, name in enumerate(tracks.cameras):
@@ -200,95 +204,24 @@ def _without(images: MultiviewImages, tracks: Tracks) -> MultiviewImages:
     return rest
 
 
-def _solve(
-    cameras: dict[str, Camera],
-    tracks: Tracks,
-    given: dict[str, Camera],
-    settings: RefineSettings,
-    rounds: int = 8,
-) -> tuple[dict[str, Camera], Tracks]:
-    """Poses over the tracks that agree: outliers leave in rounds, at thrice the median."""
-    centres = {name: camera.centre_mm for name, camera in given.items()}
-    points = midpoints(cameras, tracks)
-    for _ in range(rounds):
-        distance = residuals_px(cameras, tracks, points)
-        limit = max(settings.max_residual_px, 3 * float(np.median(distance)))
-        tracks = tracks.kept(distance < limit)
-        if tracks.count < 10:
-            break
-        cameras, points = adjust(
-            cameras,
-            tracks,
-            midpoints(cameras, tracks),
-            free_poses=True,
-            free_focal=settings.refine_focal,
-            loss_px=settings.loss_px,
-            centres_mm=centres,
-            shift_mm=settings.shift_mm,
-        )
-    return cameras, tracks
-
-
 def _greys(images: MultiviewImages) -> Greys | None:
-    """The images of all features; None where one is not known."""
-    greys = {
-        frame: {name: features.grey for name, features in views.items()}
-        for frame, views in images.items()
-    }
-    known = all(grey is not None for views in greys.values() for grey in views.values())
-    return greys if known else None
+    """The images of all features; None where one is missing."""
+    greys: dict[int, dict[str, np.ndarray]] = {}
+    for frame, views in images.items():
+        greys[frame] = {}
+        for name, features in views.items():
+            if features.grey is None:
+                return None
+            greys[frame][name] = features.grey
+    return greys
 
 
-def _solve_patches(
-    cameras: dict[str, Camera],
-    tracks: Tracks,
-    given: dict[str, Camera],
-    greys: Greys,
-    settings: RefineSettings,
-) -> tuple[dict[str, Camera], Tracks]:
-    """Poses over the patches of tracks; the poses and tracks as they were where few agree."""
-    aligned = _aligned(cameras, tracks, greys, settings)
-    if aligned.count < settings.min_tracks:
-        return cameras, tracks
-    fine = replace(
-        settings, max_residual_px=settings.patch_residual_px, loss_px=settings.patch_loss_px
-    )
-    return _solve(cameras, aligned, given, fine)
-
-
-def _aligned(cameras, tracks: Tracks, greys: Greys, settings: RefineSettings) -> Tracks:
-    points = midpoints(cameras, tracks)
-    return align_patches(cameras, tracks, points, greys, radius_px=settings.patch_radius_px)
-
-
-def _consistent(cameras, tracks: Tracks, settings: RefineSettings) -> Tracks:
-    """Tracks without the observations that are no match by any measure."""
-    distance = residuals_px(cameras, tracks, midpoints(cameras, tracks))
-    return tracks.kept(distance < 3 * settings.max_residual_px)
-
-
-def _linked(tracks: Tracks, least: int) -> set[str]:
-    """The largest set of cameras that tracks tie together, each with `least` observations."""
-    enough = tracks.per_camera() >= least
-    shared = coo_matrix(
-        (np.ones(len(tracks.track)), (tracks.camera, tracks.track)),
-        shape=(len(tracks.cameras), max(tracks.count, 1)),
-    ).tocsr()
-    ties = (shared @ shared.T).toarray() * enough[:, None] * enough
-    component = connected_components(ties > 0, directed=False)[1]
-    component[~enough] = -1
-    if not enough.any():
-        return set()
-    largest = np.bincount(component[enough]).argmax()
-    return {n for n, c in zip(tracks.cameras, component, strict=True) if c == largest}
-
-
-def _measured(
-    cameras: dict[str, Camera], tracks: Tracks, settings: RefineSettings
+def _held_out_error(
+    cameras: dict[str, Camera], tracks: Tracks, settings: RigRefinementSettings
 ) -> tuple[np.ndarray, dict[str, float]]:
     """Expected pixels (K, 2) of tracks triangulated with these cameras; their error."""
-    points = midpoints(cameras, tracks)
-    _, points = adjust(cameras, tracks, points, free_poses=False, loss_px=settings.loss_px)
+    points = triangulate_tracks(cameras, tracks)
+    _, points = bundle_adjust(cameras, tracks, points, free_poses=False, loss_px=settings.loss_px)
     expected = np.zeros((len(tracks.track), 2))
     for i, name in enumerate(tracks.cameras):
         mine = tracks.camera == i

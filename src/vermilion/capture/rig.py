@@ -1,15 +1,16 @@
-"""The cameras of a take, wherever they come from: given, calibrated from a board, or assumed."""
+"""The cameras of a take: given, calibrated from a board, or assumed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vermilion.capture.board import Board, BoardDetector, Corners
-from vermilion.capture.calibrate import Calibration, calibrate_rig
+from vermilion.capture.calibrate import Calibration, CalibrationSettings, calibrate_rig
 from vermilion.capture.manifest import Manifest
 from vermilion.geometry.camera import Camera, pinhole, read_cameras
 from vermilion.imaging.draw import to_display
@@ -21,11 +22,12 @@ from vermilion.storage.progress import progress
 
 @dataclass(frozen=True)
 class RigCameras:
-    """Calibrated cameras and where they come from.
+    """The cameras of a take and their origin.
 
     Attributes:
+        cameras: name -> camera.
         method: `given`, `charuco`, `checkerboard` or `assumed`.
-        calibration: the calibration where one was made.
+        calibration: the calibration from a board, if there was one.
     """
 
     cameras: dict[str, Camera]
@@ -33,7 +35,7 @@ class RigCameras:
     calibration: Calibration | None = None
 
     def summary(self) -> dict:
-        """What `capture/cameras.json` holds."""
+        """Contents of `capture/cameras.json`."""
         made = self.calibration
         return {
             "calibrated": self.method != "assumed",
@@ -72,11 +74,8 @@ def rig_cameras(
     sizes: dict[str, tuple[int, int]],
     reference: str,
     board: Board,
-    model: str = "OPENCV",
-    refine_principal_point: bool = True,
-    max_view_px: float = 2.0,
-    assumed_focal: float = 1.2,
-    **place,
+    settings: CalibrationSettings | None = None,
+    **place: Any,
 ) -> RigCameras:
     """Cameras of a take: read from `cameras/`, else calibrated from `calibration/`, else assumed.
 
@@ -84,10 +83,14 @@ def rig_cameras(
         source: capture folder, frame folder or video.
         sizes: camera -> (width, height) of its images.
         reference: camera whose frame becomes the world of a calibrated rig.
-        assumed_focal: focal length of a single uncalibrated camera, in image widths.
+        board: the calibration board.
+        settings: how cameras are calibrated.
+        place: subject and take, for error messages.
 
-    Raises InputError where several cameras have neither, or the given ones do not fit the images.
+    Raises:
+        InputError: several cameras have neither folder, or the given cameras do not fit the images.
     """
+    settings = settings or CalibrationSettings()
     given, calibration = folder_of(source, "cameras"), folder_of(source, "calibration")
     if given.is_dir():
         cameras = read_cameras(given)
@@ -100,13 +103,12 @@ def rig_cameras(
         seen = detect_boards(calibration, board, sizes, place)
         if reference not in sizes:
             reference = min(sizes)
-        made = calibrate_rig(
-            board, seen, sizes, reference, model, refine_principal_point, max_view_px, **place
-        )
+        made = calibrate_rig(board, seen, sizes, reference, settings, **place)
         return RigCameras(made.cameras, board.kind, made)
     if len(sizes) == 1:
         name, (width, height) = next(iter(sizes.items()))
-        return RigCameras({name: pinhole(name, assumed_focal * width, width, height)}, "assumed")
+        focal = settings.assumed_focal * width
+        return RigCameras({name: pinhole(name, focal, width, height)}, "assumed")
     raise InputError(
         f"{len(sizes)} cameras without a calibration",
         "cameras/ (a COLMAP text model) or calibration/<camera>/ (views of a board)",
@@ -130,7 +132,8 @@ def detect_boards(
 
     Raises InputError listing all images that do not have their camera's size.
     """
-    detector, seen, problems = BoardDetector(board), {}, []
+    detector, problems = BoardDetector(board), []
+    seen: dict[str, dict[str, Corners]] = {}
     for name, size in sizes.items():
         seen[name] = {}
         for moment, path in progress(calibration_views(folder, name).items(), f"board in {name}"):
@@ -153,7 +156,7 @@ def detect_boards(
         raise InputError(
             f"{len(problems)} problem(s):\n  " + "\n  ".join(problems) + "\n",
             "calibration images that fit",
-            "Mend all of them, then run again.",
+            "Correct all of them, then run again.",
             path=folder,
             **place,
         )

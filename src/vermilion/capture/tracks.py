@@ -1,4 +1,4 @@
-"""Points that several cameras see at one moment, found by their looks near the epipolar lines."""
+"""Points that several cameras see at one moment: features matched near the epipolar lines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Features:
     Attributes:
         points_px: (N, 2).
         descriptors: (N, 128) float32 of unit length.
-        grey: (h, w) uint8, the image itself; None where it is not known.
+        grey: (h, w) uint8, the image; None where it is not known.
     """
 
     points_px: np.ndarray
@@ -35,11 +35,11 @@ class Tracks:
     """Observations of points: K observations of `count` points.
 
     Attributes:
-        cameras: names; `camera` counts in them.
-        track: (K,) which point, 0 to `count` - 1.
-        camera: (K,) which camera; a point has at most one observation a camera.
-        pixels: (K, 2) where.
-        frame: (K,) which frame the observation is of.
+        cameras: names.
+        track: (K,) int index of the point, 0 to `count` - 1.
+        camera: (K,) int index into `cameras`; a point has at most one observation a camera.
+        pixels: (K, 2) places.
+        frame: (K,) int frame of the observation.
     """
 
     cameras: tuple[str, ...]
@@ -50,33 +50,34 @@ class Tracks:
 
     @property
     def count(self) -> int:
+        """Number of points."""
         return len(np.unique(self.track))
 
     def kept(self, observations: np.ndarray) -> Tracks:
-        """The observations of a mask (K,) whose point still has two of them; points renumbered."""
+        """The `observations` (K,) bool whose point keeps at least two of them; points renumbered."""
         sizes = np.bincount(self.track, weights=observations, minlength=1)
         keep = observations & (sizes[self.track] >= 2)
         track = np.unique(self.track[keep], return_inverse=True)[1]
         return Tracks(self.cameras, track, self.camera[keep], self.pixels[keep], self.frame[keep])
 
     def per_camera(self) -> np.ndarray:
-        """Observations of each camera, (C,)."""
+        """Number of observations (C,) of each camera."""
         return np.bincount(self.camera, minlength=len(self.cameras))
 
 
 @dataclass(frozen=True)
-class MatchSettings:
+class FeatureMatchSettings:
     """How features are found and matched.
 
     Attributes:
         contrast: smallest contrast of a feature, in [0, 1].
         max_features: of one image.
-        gate_deg: how far a match may lie from the epipolar plane of the given poses.
-        max_angle_deg: pairs of cameras whose axes differ by more are not matched.
-        ratio: distance of the best descriptor within the gate over that of the second best.
-        verify_px: a match agrees with its pair's essential matrix within this distance.
-        min_pair: agreeing matches without which a pair is not used.
-        seed: of the random samples.
+        gate_deg: largest angle of a match to the epipolar plane of the given poses.
+        max_angle_deg: largest angle between the axes of two cameras that are matched.
+        ratio: largest ratio of descriptor distances, best over second best within the gate.
+        verify_px: largest distance at which a match agrees with its pair's essential matrix.
+        min_pair: fewest agreeing matches of a pair of cameras that is used.
+        seed: of the random samples and of the held-out tracks.
     """
 
     contrast: float = 0.002
@@ -90,7 +91,10 @@ class MatchSettings:
 
 
 def find_features(linear_rgb: np.ndarray, contrast: float, max_features: int) -> Features:
-    """SIFT features of a linear image (h, w, 3)."""
+    """SIFT features of an image `linear_rgb` (h, w, 3).
+
+    `contrast` and `max_features` as in `FeatureMatchSettings`.
+    """
     grey = np.rint(to_display(linear_rgb) @ [0.299, 0.587, 0.114]).astype(np.uint8)
     options = pycolmap.FeatureExtractionOptions()
     options.num_threads, options.use_gpu = 1, False
@@ -107,16 +111,16 @@ def find_features(linear_rgb: np.ndarray, contrast: float, max_features: int) ->
 def match_frame(
     cameras: Mapping[str, Camera],
     features: Mapping[str, Features],
-    settings: MatchSettings,
+    settings: FeatureMatchSettings,
     frame: int = 0,
 ) -> Tracks:
-    """Tracks of one frame: matched pairs of cameras, verified, joined.
+    """Tracks of one frame: connected components of the verified matches of all pairs of cameras.
 
-    A component that holds two features of one camera is left out.
+    A component with two features of one camera is left out.
     """
     names = tuple(cameras)
     starts = np.cumsum([0] + [len(features[n].points_px) if n in features else 0 for n in names])
-    links = [np.zeros((0, 2), int)]
+    matches = [np.zeros((0, 2), int)]
     for i, j in combinations(range(len(names)), 2):
         a, b = names[i], names[j]
         if a not in features or b not in features:
@@ -124,9 +128,9 @@ def match_frame(
         cosine = cameras[a].rotation[2] @ cameras[b].rotation[2]
         if cosine < np.cos(np.radians(settings.max_angle_deg)):
             continue
-        pairs = match_pair(cameras[a], cameras[b], features[a], features[b], settings)
-        links.append(pairs + np.array([starts[i], starts[j]]))
-    links = np.concatenate(links)
+        pairs = match_features(cameras[a], cameras[b], features[a], features[b], settings)
+        matches.append(pairs + np.array([starts[i], starts[j]]))
+    links = np.concatenate(matches)
     n = starts[-1]
     graph = coo_matrix((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(n, n))
     component = connected_components(graph, directed=False)[1]
@@ -143,8 +147,8 @@ def match_frame(
     return everything.kept(~clash[component])
 
 
-def join_tracks(parts: list[Tracks]) -> Tracks:
-    """Tracks of several frames as one; each frame's points are its own."""
+def concatenate_tracks(parts: list[Tracks]) -> Tracks:
+    """Tracks of several frames as one; frames do not share points."""
     offsets = np.cumsum([0] + [part.count for part in parts])
     track = [part.track + offset for part, offset in zip(parts, offsets[:-1], strict=True)]
     return Tracks(
@@ -157,11 +161,14 @@ def join_tracks(parts: list[Tracks]) -> Tracks:
     )
 
 
-def match_pair(
-    a: Camera, b: Camera, of_a: Features, of_b: Features, settings: MatchSettings
+def match_features(
+    a: Camera, b: Camera, of_a: Features, of_b: Features, settings: FeatureMatchSettings
 ) -> np.ndarray:
-    """Indices (M, 2) of features that look alike, lie near each other's epipolar line and agree
-    with one essential matrix; none where fewer than `min_pair` do."""
+    """Indices (M, 2) of the matching features of two cameras.
+
+    Matches have the nearest descriptor in both directions, lie near each other's epipolar line and
+    agree with one essential matrix. There are none where fewer than `min_pair` do.
+    """
     none = np.zeros((0, 2), int)
     if min(len(of_a.points_px), len(of_b.points_px)) < settings.min_pair:
         return none
@@ -191,7 +198,13 @@ def match_pair(
 
 
 def epipolar_sine(a: Camera, b: Camera, px_a: np.ndarray, px_b: np.ndarray) -> np.ndarray:
-    """Sine of the angle (Na, Nb) between rays of `b` and the epipolar planes of rays of `a`."""
+    """Sine (Na, Nb) of the angle between rays of `b` and the epipolar planes of rays of `a`.
+
+    Args:
+        a, b: the cameras.
+        px_a: (Na, 2) pixels of `a`.
+        px_b: (Nb, 2) pixels of `b`.
+    """
     normals = np.cross(b.centre_mm - a.centre_mm, a.rays(px_a)[1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return np.abs(normals.astype(np.float32) @ b.rays(px_b)[1].T.astype(np.float32))

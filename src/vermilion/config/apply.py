@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 HEX = r"^#[0-9a-fA-F]{6}$"
 
@@ -30,7 +30,7 @@ class OverlayConfig(StageConfig):
         0.35,
         ge=0.0,
         le=2.0,
-        description="Image left round the face, as a share of the face's size.",
+        description="Margin around the face, as a share of the face's size.",
     )
     opacity: float = Field(0.85, ge=0.0, le=1.0, description="Opacity of the mesh (0 to 1).")
 
@@ -65,8 +65,6 @@ class ApplyConfig(StageConfig):
         description="Regressor to apply: `MS`, `PS-{subject}` or `GR-{subject}`, where `{subject}` "
         "stands for the take's subject, or the full name of one.",
     )
-    export: ExportConfig = Field(
-        default_factory=ExportConfig, description="Files that other programs open."
-    )
-    overlay: OverlayConfig = Field(default_factory=OverlayConfig, description="The overlay video.")
-    makeup: MakeUpConfig = Field(default_factory=MakeUpConfig, description="Virtual make-up.")
+    export: ExportConfig = section(ExportConfig, "Files that other programs open.")
+    overlay: OverlayConfig = section(OverlayConfig, "The overlay video.")
+    makeup: MakeUpConfig = section(MakeUpConfig, "Virtual make-up.")

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from collections.abc import Callable
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Section = TypeVar("Section", bound="StageConfig")
 
 
 class StageConfig(BaseModel):
     """A section: unknown keys are errors, values cannot be changed once read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def section(kind: Callable[..., Section], description: str) -> Section:
+    """Field that holds a section below this one; left out, all its keys have their defaults."""
+    field: Section = Field(default_factory=kind, description=description)
+    return field

@@ -6,13 +6,13 @@ from typing import Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 from vermilion.imaging.colour_space import check_colour_space
 from vermilion.imaging.images import ImageReading
 
 
 class ManifestConfig(StageConfig):
-    """What is recorded of the images."""
+    """What the manifest records about the images."""
 
     hash_decoded: bool = Field(
         False,
@@ -47,7 +47,7 @@ class CalibrationConfig(StageConfig):
         "distortion terms.",
     )
     refine_principal_point: bool = Field(
-        True, description="Estimate the principal point; otherwise it is the middle of the image."
+        True, description="Estimate the principal point; off: it is the middle of the image."
     )
     max_view_px: float = Field(
         2.0, gt=0, le=50, description="Board views with a larger RMS error are left out (pixels)."
@@ -90,13 +90,13 @@ class CalibrationConfig(StageConfig):
         return self
 
 
-class RefinementConfig(StageConfig):
-    """Refinement of the cameras' poses over skin and tattoo features (bundle adjustment)."""
+class RigRefinementConfig(StageConfig):
+    """Refinement of the cameras' poses by bundle adjustment over skin and tattoo features."""
 
     mode: Literal["off", "auto", "on"] = Field(
         "auto",
-        description="`off`: never; `auto`: where the given poses are off and the refined ones are "
-        "clearly better on held-out tracks; `on`: always tried, an error where it fails.",
+        description="`off`: never. `auto`: only where the given poses are inaccurate and the refined ones "
+        "are clearly better on held-out tracks. `on`: always; a failure is an error.",
     )
     board_calibrated: bool = Field(
         False, description="Also refine cameras that were calibrated here from a board."
@@ -105,25 +105,25 @@ class RefinementConfig(StageConfig):
         1, ge=1, le=50, description="Frames used, evenly spaced from the first to the last (count)."
     )
     contrast: float = Field(
-        0.002, gt=0, lt=0.1, description="Smallest contrast of a feature (of the range of grey)."
+        0.002, gt=0, lt=0.1, description="Smallest contrast of a feature (share of the grey range)."
     )
     max_features: int = Field(
-        6000, ge=100, le=50000, description="Features of one image at most (count)."
+        6000, ge=100, le=50000, description="Features of one image, at most (count)."
     )
     gate_deg: float = Field(
         1.0,
         gt=0,
         le=10,
-        description="How far a match may lie from the epipolar plane of the given poses (degrees).",
+        description="Largest angle of a match to the epipolar plane of the given poses (degrees).",
     )
     fine_gate_deg: float = Field(
-        0.1, gt=0, le=10, description="The same once the poses are refined roughly (degrees)."
+        0.1, gt=0, le=10, description="The same after the first adjustment of the poses (degrees)."
     )
     max_angle_deg: float = Field(
         40.0,
         gt=0,
         le=90,
-        description="Cameras whose axes differ by more are not matched (degrees).",
+        description="Largest angle between the axes of two cameras that are matched (degrees).",
     )
     ratio: float = Field(
         0.85,
@@ -135,13 +135,16 @@ class RefinementConfig(StageConfig):
         2.0,
         gt=0,
         le=50,
-        description="A match agrees with its pair's geometry within this (pixels).",
+        description="Largest distance at which a match agrees with its pair's essential matrix (pixels).",
     )
     min_pair: int = Field(
-        15, ge=6, description="A pair of cameras with fewer agreeing matches is not used (count)."
+        15, ge=6, description="Fewest agreeing matches of a pair of cameras that is used (count)."
     )
     max_residual_px: float = Field(
-        1.0, gt=0, le=20, description="Observations farther off at the end are outliers (pixels)."
+        1.0,
+        gt=0,
+        le=20,
+        description="Observations with a larger final residual are outliers (pixels).",
     )
     loss_px: float = Field(
         0.3, gt=0, le=20, description="Residual at which the robust loss becomes linear (pixels)."
@@ -150,14 +153,14 @@ class RefinementConfig(StageConfig):
         8,
         ge=0,
         le=30,
-        description="Half the width of the surface patches that are matched by least squares at the "
-        "end (px); 0: none, features are as exact as their detector.",
+        description="Half the width of the surface patches that are matched by least squares in the "
+        "last step (px); 0: no patches, features keep the accuracy of their detector.",
     )
     patch_residual_px: float = Field(
         0.3,
         gt=0.01,
         le=10,
-        description="Patches farther from their point are outliers (px).",
+        description="Patches with a larger residual are outliers (px).",
     )
     patch_loss_px: float = Field(
         0.1,
@@ -166,26 +169,31 @@ class RefinementConfig(StageConfig):
         description="Residual of patches at which the robust loss turns linear (px).",
     )
     min_tracks: int = Field(
-        100, ge=20, description="Nothing is refined over fewer points seen by two cameras (count)."
+        100,
+        ge=20,
+        description="Fewest points seen by two cameras over which a rig is refined (count).",
     )
     min_camera_tracks: int = Field(
         30, ge=6, description="A camera with fewer observations keeps its given pose (count)."
     )
     held_out: float = Field(
-        0.2, ge=0.05, le=0.5, description="Part of the tracks held out to judge the result."
+        0.2,
+        ge=0.05,
+        le=0.5,
+        description="Part of the tracks that is held out to measure the result.",
     )
     threshold_px: float = Field(
         1.0,
         ge=0,
         le=50,
-        description="`auto` leaves cameras alone whose median error is below (pixels).",
+        description="`auto` does not change cameras with a smaller median error (pixels).",
     )
     improvement: float = Field(
         0.7,
         gt=0,
         lt=1,
-        description="Refined cameras are taken where the held-out median error falls to this part "
-        "of the given cameras' or below.",
+        description="Refined cameras are taken where their held-out median error is at most this part "
+        "of the given cameras'.",
     )
     turn_deg: float = Field(
         0.3, gt=0, le=10, description="Expected error of a given orientation (degrees)."
@@ -194,10 +202,10 @@ class RefinementConfig(StageConfig):
         1.0,
         gt=0,
         le=100,
-        description="Expected error of a given position (mm); it holds the rig's shape.",
+        description="Expected error of a given position (mm); the prior that keeps the rig's shape.",
     )
     refine_focal: bool = Field(False, description="Also adjust the focal lengths.")
-    seed: int = Field(0, ge=0, description="Of the random samples.")
+    seed: int = Field(0, ge=0, description="Seed of the random samples and of the held-out tracks.")
 
 
 class CaptureConfig(StageConfig):
@@ -206,8 +214,8 @@ class CaptureConfig(StageConfig):
     frontal_camera: str = Field(
         "face2",
         min_length=1,
-        description="Camera of a multi-view take that stands for the monocular video; the world of a "
-        "rig calibrated here is its frame.",
+        description="Camera of a multi-view take that serves as the monocular video. A rig that is "
+        "calibrated from a board has the frame of this camera as its world.",
     )
     exr_layer: str = Field(
         "",
@@ -220,14 +228,14 @@ class CaptureConfig(StageConfig):
         "studio configuration has it (`ACEScg`, `ARRI LogC3 (EI800)`, ...); by default sRGB, and linear "
         "sRGB for EXR and HDR. Videos are read by their tags.",
     )
-    manifest: ManifestConfig = Field(
-        default_factory=ManifestConfig, description="What is recorded of the images."
+    manifest: ManifestConfig = section(
+        ManifestConfig, "What the manifest records about the images."
     )
-    calibration: CalibrationConfig = Field(
-        default_factory=CalibrationConfig, description="Calibration from images of a board."
+    calibration: CalibrationConfig = section(
+        CalibrationConfig, "Calibration from images of a board."
     )
-    refinement: RefinementConfig = Field(
-        default_factory=RefinementConfig, description="Refinement of the cameras' poses."
+    refinement: RigRefinementConfig = section(
+        RigRefinementConfig, "Refinement of the cameras' poses."
     )
 
     @field_validator("colour_space")

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class BoostingConfig(StageConfig):
@@ -30,28 +30,31 @@ class TrackRidgeConfig(StageConfig):
     """Ridges near the tracked lips (`kind: track`). Lengths are per inter-ocular distance."""
 
     frames: int = Field(
-        20, ge=1, le=500, description="Frames of a take that tell its lips, evenly spread (count)."
+        20,
+        ge=1,
+        le=500,
+        description="Frames of a take from which its lip borders are learnt, evenly spaced (count).",
     )
     reach: float = Field(
         0.08,
         gt=0,
         le=0.3,
-        description="How far from the tracked one the take's outer border is looked for.",
+        description="Search distance for the take's outer border, from the tracked border.",
     )
     frame_reach: float = Field(
         0.02,
         gt=0,
         le=0.2,
-        description="How far from the take's outer border a frame's may lie; half as far again at most.",
+        description="Search distance for a frame's outer border, from the take's; 1.5 times this at most.",
     )
     lip_reach: float = Field(
         0.05,
         gt=0,
         le=0.3,
-        description="How far from there a lip or a corner as a whole may lie in a frame, as where lips roll.",
+        description="Largest shift of a whole lip or corner from there in a frame, as when lips roll.",
     )
     inner_reach: float = Field(
-        0.05, gt=0, le=0.3, description="How far from where it lies on average the inner border is."
+        0.05, gt=0, le=0.3, description="Search distance for the inner border, from its mean place."
     )
 
 
@@ -76,8 +79,7 @@ class ContourDetectorConfig(StageConfig):
         0.16,
         gt=0,
         le=0.5,
-        description="Width of the band round the landmarks' mouth that is looked at (per "
-        "inter-ocular distance).",
+        description="Width of the searched band around the landmarks' mouth (per inter-ocular distance).",
     )
     features: int = Field(1000, ge=50, le=50_000, description="Size of the pool (features).")
     patch_px: int = Field(
@@ -96,10 +98,10 @@ class ContourDetectorConfig(StageConfig):
         0.08, gt=0, le=1, description="Share of the pixels far from a contour that are drawn."
     )
     max_samples: int = Field(
-        30_000, ge=1000, description="Pixels at most that a detector is trained on at first."
+        30_000, ge=1000, description="Pixels, at most, of the first training of a detector."
     )
     hard_rounds: int = Field(
-        1, ge=0, le=5, description="Rounds in which pixels wrongly taken for contour are added."
+        1, ge=0, le=5, description="Rounds of training that add false positives (hard negatives)."
     )
     smoothing_px: float = Field(
         1.0, gt=0, le=5, description="Deviation of the Gaussian on the maps (region pixels)."
@@ -114,8 +116,8 @@ class ContourDetectorConfig(StageConfig):
         0.08,
         gt=0,
         le=0.3,
-        description="`landmarks`: how far from the landmarks the lips' border is looked for (per "
-        "inter-ocular distance; the outer one half as far again).",
+        description="`landmarks`: search distance for the lips' border, from the landmarks (per "
+        "inter-ocular distance; 1.5 times this for the outer border).",
     )
     lips_reach: float = Field(
         0.02,
@@ -128,21 +130,16 @@ class ContourDetectorConfig(StageConfig):
     edge_weight: float = Field(
         4.0,
         ge=0,
-        description="`track`, `landmarks`: worth of the strongest edge against a border one reach away "
-        "from where it is looked for; 0 draws the start alone.",
+        description="`track`, `landmarks`: weight of the strongest edge against a border at the search "
+        "distance from the start; 0 keeps the start.",
     )
     stiffness: float = Field(
         6.0,
         ge=0,
-        description="`track`, `landmarks`: cost of a slope of 1 between the border and where it is looked "
-        "for.",
+        description="`track`, `landmarks`: cost of a slope of 1 between the border and the start.",
     )
-    track: TrackRidgeConfig = Field(
-        default_factory=TrackRidgeConfig, description="Ridges near the tracked lips."
-    )
-    boosting: BoostingConfig = Field(
-        default_factory=BoostingConfig, description="Boosted trees of the detectors."
-    )
+    track: TrackRidgeConfig = section(TrackRidgeConfig, "Ridges near the tracked lips.")
+    boosting: BoostingConfig = section(BoostingConfig, "Boosted trees of the detectors.")
     seed: int = Field(0, ge=0, description="Seed of the random features and samples.")
 
 
@@ -163,9 +160,5 @@ class ContourMapsConfig(StageConfig):
 class ContoursConfig(StageConfig):
     """Lip contour likelihood maps."""
 
-    detector: ContourDetectorConfig = Field(
-        default_factory=ContourDetectorConfig, description="How contours are found."
-    )
-    maps: ContourMapsConfig = Field(
-        default_factory=ContourMapsConfig, description="Maps of every frame."
-    )
+    detector: ContourDetectorConfig = section(ContourDetectorConfig, "How contours are found.")
+    maps: ContourMapsConfig = section(ContourMapsConfig, "Maps of every frame.")

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class LayersConfig(StageConfig):
@@ -21,9 +21,9 @@ class LayersConfig(StageConfig):
     )
     region: Literal["rigid", "face"] = Field(
         "face",
-        description="What the accurate mesh is aligned by. `face`: all of the face outside the mask, by "
-        "area, as the evaluation aligns. `rigid`: forehead, temples and bridge of the nose, as far as they "
-        "fit; what the tracker gets wrong of the face as a whole then stays in the corrected mesh.",
+        description="Region by which the accurate mesh is aligned. `face`: the face outside the mask, "
+        "weighted by area, as the evaluation aligns. `rigid`: forehead, temples and bridge of the nose, "
+        "without outliers; errors of the tracker in the whole face then stay in the corrected mesh.",
     )
     max_alignment_mm: float = Field(
         6.0,
@@ -40,23 +40,23 @@ class IntegrationConfig(StageConfig):
         16.0,
         ge=0.0,
         le=50.0,
-        description="Width of the ring outside the mask that may give way, so that the border shows "
-        "no crease (mm); 0 fixes everything outside.",
+        description="Width of the ring outside the mask that may deform, so that the border shows no "
+        "crease (mm); 0: everything outside is fixed.",
     )
     detail_mm: float = Field(
         15.0,
         ge=0.0,
         le=1000.0,
-        description="Detail finer than this comes from the layers, the place of the mesh over longer "
-        "ranges from regressed displacements (mm). 0: layers alone, as in the paper.",
+        description="Finer detail than this comes from the layers, coarser shape from regressed "
+        "displacements (mm). 0: layers alone, as in the paper.",
     )
     smooth_s: float = Field(
         0.1,
         ge=0.0,
         le=1.0,
-        description="What is regressed for a frame is the middle of a parabola fitted over so many seconds "
-        "to either side (3 frames at 30 a second, none below 20): noise of single frames goes, nothing "
-        "comes late. 0: every frame for itself, as in the paper.",
+        description="Half the window of a symmetric quadratic filter over the regressed values (seconds; 3 "
+        "frames at 30 a second, none below 20). It removes per-frame noise without lag. 0: no filter, as "
+        "in the paper.",
     )
 
     def at(self, fps: float) -> dict[str, float | int]:
@@ -70,32 +70,32 @@ class IntegrationConfig(StageConfig):
 
 
 class ImageAgreementConfig(StageConfig):
-    """How the corrected mesh is made to agree with the image. None of it is in the paper."""
+    """How the corrected mesh is made to agree with the image (not in the paper)."""
 
     repose: bool = Field(
         True,
-        description="Lay the corrected head on the image again: rigidly, by its lip contours, brows "
-        "and eyes. Without, true lips beside a coarse face of other proportions miss the image's.",
+        description="Align the corrected head with the image again: rigidly, by its lip contours, brows "
+        "and eyes. Otherwise correct lips on a coarse face of other proportions miss the image's lips.",
     )
     repose_frames: float = Field(
         3.0,
         ge=0.0,
         le=30.0,
-        description="Deviation of the filter over time of that motion; symmetric, so without lag "
-        "(frames). 0: every frame for itself.",
+        description="Deviation of the Gaussian filter over time of that motion (frames); it does not lag. "
+        "0: no filter.",
     )
     contour_weight: float = Field(
         1.0,
         ge=0.0,
         le=1000.0,
-        description="Weight of a millimetre of lip contour, as a constraint that it projects on the one "
-        "found in the image, beside the stiffness of the mesh. 0: none.",
+        description="Weight, per millimetre of lip contour, of the constraint that it projects onto the "
+        "contour found in the image. 0: no constraint.",
     )
     contour_robust_mm: float = Field(
         2.5,
         gt=0.0,
         le=100.0,
-        description="A contour point this far beside the mesh's contour counts half, farther ones less (mm).",
+        description="A contour point at this distance from the mesh's contour counts half (mm).",
     )
     closed_gap_iod: float = Field(
         0.012,
@@ -106,8 +106,8 @@ class ImageAgreementConfig(StageConfig):
     )
     contact: bool = Field(
         True,
-        description="Lips that touch in the image meet in the mesh (by `contour_weight`), and never pass "
-        "through each other.",
+        description="Lips that touch in the image touch in the mesh (by `contour_weight`), and lips never "
+        "pass through each other.",
     )
 
     @property
@@ -119,19 +119,15 @@ class ImageAgreementConfig(StageConfig):
 class CorrectionConfig(StageConfig):
     """The correction layer (Lips16 4.2)."""
 
-    layers: LayersConfig = Field(default_factory=LayersConfig, description="Making layers.")
-    integration: IntegrationConfig = Field(
-        default_factory=IntegrationConfig, description="Applying layers."
-    )
-    image: ImageAgreementConfig = Field(
-        default_factory=ImageAgreementConfig, description="Agreeing with the image."
-    )
+    layers: LayersConfig = section(LayersConfig, "Making layers.")
+    integration: IntegrationConfig = section(IntegrationConfig, "Applying layers.")
+    image: ImageAgreementConfig = section(ImageAgreementConfig, "Agreeing with the image.")
     neutral_frames: dict[str, int] = Field(
         default_factory=dict,
-        description="Videos with a frame of the neutral that the person's rig takes begin with (mouth "
-        "slightly open, as there): `subject/take: frame`. It tells how the track errs in this take.",
+        description="`subject/take: frame` for videos that have a frame of the neutral with which the "
+        "person's rig takes begin (mouth slightly open). It gives the track's error in this take.",
     )
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""
-        return self.image.reach_frames + self.integration.at(fps)["smooth_frames"]
+        return self.image.reach_frames + int(self.integration.at(fps)["smooth_frames"])

@@ -14,9 +14,9 @@ class CorrespondenceConfig(StageConfig):
 
     landmarks: Literal["image", "model"] = Field(
         "image",
-        description="What ties the two neutrals together first. `image`: the landmarks of the "
-        "frontal image, carried onto both meshes along their rays (the paper's way). `model`: the "
-        "landmark vertices of the template and of the tracker's model.",
+        description="First correspondences of the two neutrals. `image`: the landmarks of the frontal "
+        "image, projected onto both meshes along their rays (as in the paper). `model`: the landmark "
+        "vertices of the template and of the tracker's model.",
     )
     landmark_weight: float = Field(
         0.3, gt=0.0, le=100.0, description="Weight of a landmark beside bending (1/mm^2)."
@@ -24,14 +24,14 @@ class CorrespondenceConfig(StageConfig):
     wavelengths_mm: list[float] = Field(
         [100.0, 60.0, 40.0, 25.0, 15.0, 15.0],
         min_length=1,
-        description="One dense step each: differences of the two surfaces of a shorter wavelength are "
-        "smoothed away (mm).",
+        description="Dense steps: each smooths away differences of the two surfaces of a shorter "
+        "wavelength (mm).",
     )
     search_distance_mm: float = Field(
         25.0,
         gt=0.0,
         le=100.0,
-        description="Farther closest points do not pull at the registration (mm).",
+        description="Largest distance of a closest point that is used (mm).",
     )
     max_distance_mm: float = Field(
         4.0,
@@ -58,6 +58,6 @@ class CorrespondenceConfig(StageConfig):
         10.0,
         ge=0.0,
         le=60.0,
-        description="The correction layer keeps this far from the eyelids' landmarks (mm): lips say "
-        "nothing of blinks.",
+        description="Smallest distance of the correction layer from the eyelids' landmarks (mm): lip "
+        "features do not predict blinks.",
     )

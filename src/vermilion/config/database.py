@@ -14,12 +14,12 @@ class DatabaseConfig(StageConfig):
         1,
         ge=0,
         le=9,
-        description="Deflate level of the layers (0 to 9); 0 stores them as they are.",
+        description="Deflate level of the layers (0 to 9); 0: not compressed.",
     )
     min_common_mask: float = Field(
         0.5,
         gt=0.0,
         le=1.0,
-        description="The layers cover the triangles that all subjects have; the smallest share of "
-        "any subject's mask that must be left (0 to 1).",
+        description="Smallest share of any subject's mask that must be common to all subjects (0 to 1): "
+        "the layers cover the common triangles.",
     )

@@ -1,10 +1,10 @@
-"""Configuration of the finer sequence: dense correction of the coarse meshes (Mono13 7), relief (8)."""
+"""Configuration of the detailed sequence: corrective flow (Mono13 7) and relief (Mono13 8)."""
 
 from __future__ import annotations
 
 from pydantic import Field, field_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class FlowEnergyConfig(StageConfig):
@@ -17,25 +17,25 @@ class FlowEnergyConfig(StageConfig):
     similarity: float = Field(
         50.0,
         ge=0,
-        description="Likeness of the corrective flows of neighbouring frames (gamma; per px squared).",
+        description="Similarity of the corrective flows of neighbouring frames (gamma; per px squared).",
     )
     gradient_weight: float = Field(
         1.0,
         ge=0,
         le=100,
-        description="Worth of gradient constancy against colour constancy (share).",
+        description="Weight of gradient constancy against colour constancy (ratio).",
     )
     structure_px: float = Field(
         0.1,
         gt=0,
         le=10,
-        description="Slope of a flow above which smoothness gives way (px per px).",
+        description="Slope of a flow above which the smoothness weight falls (px per px).",
     )
     data_floor: float = Field(
         0.001,
         gt=0,
         le=10,
-        description="Differences below count squared (display values, 0 to 255).",
+        description="Smaller differences are penalised by their square (display values, 0 to 255).",
     )
     warps: int = Field(3, ge=1, le=50, description="Linearisations a level (count).")
     sweeps: int = Field(
@@ -47,18 +47,18 @@ class FlowEnergyConfig(StageConfig):
 class DeformationConfig(StageConfig):
     """How far the mesh follows the flow (Mono13 eq. 14)."""
 
-    mu: float = Field(0.5, gt=0, le=100, description="Trust in the flow against the mesh's shape.")
+    mu: float = Field(0.5, gt=0, le=100, description="Weight of the flow against the mesh's shape.")
     spacing_px: float = Field(
         4.0,
         ge=0,
         le=100,
-        description="One vertex follows the flow in each square of this side; 0: all visible ones "
+        description="One vertex follows the flow in each square of this side; 0: all visible vertices do "
         "(working pixels).",
     )
     pose: bool = Field(
         True,
-        description="Move the head as a whole first, as the flow of forehead, temples and nose bridge "
-        "asks; `false`: the paper's motion parallel to the image only.",
+        description="First move the head rigidly by the flow of forehead, temples and nose bridge; "
+        "`false`: only the paper's motion parallel to the image.",
     )
     depth_sigma_mm: float = Field(
         3.0, gt=0, le=1000, description="Typical error of the head's distance, for `pose` (mm)."
@@ -66,7 +66,7 @@ class DeformationConfig(StageConfig):
 
 
 class ReliefConfig(StageConfig):
-    """Fine relief from shading (Mono13 8), after the corrective flow where a take has it."""
+    """Fine relief from shading (Mono13 8), after the corrective flow if a take has it."""
 
     takes: list[str] = Field(
         default_factory=list,
@@ -79,19 +79,22 @@ class ReliefConfig(StageConfig):
         description="Subdivisions of the coarse mesh (count); each one costs fourfold.",
     )
     light_frames: int = Field(
-        10, ge=2, le=200, description="First frames that tell light, albedo and noise (count)."
+        10,
+        ge=2,
+        le=200,
+        description="First frames, from which light, albedo and noise are estimated (count).",
     )
     face_px: int = Field(
         640,
         ge=64,
         le=4096,
-        description="A larger face is reduced to this (longer side, pixels).",
+        description="A larger face is scaled down to this (longer side, pixels).",
     )
     detail_mm: float = Field(
         8.0,
         gt=0,
         le=1000,
-        description="Shading that changes over longer ranges is left to light and mesh (mm).",
+        description="Shading that changes over longer ranges is attributed to light and coarse mesh (mm).",
     )
     curvature_sigma: float = Field(
         0.03, gt=0, le=10, description="Typical curvature of the relief; less is smoother (1 / mm)."
@@ -103,13 +106,13 @@ class ReliefConfig(StageConfig):
         1.0,
         gt=0,
         le=255,
-        description="Least noise of a value, where the first frames show less (display values).",
+        description="Least noise of a triangle's value (display values).",
     )
     misplaced_mm: float = Field(
         0.5,
         ge=0,
         le=100,
-        description="Typical error of a place on the skin: edges of paint are trusted less (mm).",
+        description="Typical error of a place on the skin: edges of the albedo are trusted less (mm).",
     )
     iterations: int = Field(2, ge=1, le=50, description="Gauss-Newton steps (count).")
     window: int = Field(
@@ -119,7 +122,7 @@ class ReliefConfig(StageConfig):
         0.1,
         gt=0,
         le=100,
-        description="Trust in positions against normals, where both are brought together (1 / mm).",
+        description="Weight of positions against normals when the two are combined (1 / mm).",
     )
     map_px: int = Field(1024, ge=16, le=8192, description="Side of the normal maps (pixels).")
     overlay_frames: int = Field(
@@ -130,12 +133,12 @@ class ReliefConfig(StageConfig):
     @classmethod
     def _odd(cls, window: int) -> int:
         if window % 2 == 0:
-            raise ValueError("an odd number, so that the window has a middle")
+            raise ValueError("the window must be odd: it is centred on a frame")
         return window
 
 
 class DetailConfig(StageConfig):
-    """The finer sequence, in `detail/` of a take."""
+    """The detailed sequence, in `detail/` of a take."""
 
     takes: list[str] = Field(
         default_factory=list,
@@ -145,17 +148,13 @@ class DetailConfig(StageConfig):
         480,
         ge=64,
         le=4096,
-        description="A larger face is reduced to this for the flow (longer side, pixels).",
+        description="A larger face is scaled down to this for the flow (longer side, pixels).",
     )
-    flow: FlowEnergyConfig = Field(
-        default_factory=FlowEnergyConfig, description="The corrective flow (Mono13 7.1)."
+    flow: FlowEnergyConfig = section(FlowEnergyConfig, "The corrective flow (Mono13 7.1).")
+    deformation: DeformationConfig = section(
+        DeformationConfig, "The mesh after the flow (Mono13 7.2)."
     )
-    deformation: DeformationConfig = Field(
-        default_factory=DeformationConfig, description="The mesh after the flow (Mono13 7.2)."
-    )
-    relief: ReliefConfig = Field(
-        default_factory=ReliefConfig, description="Fine relief from shading (Mono13 8)."
-    )
+    relief: ReliefConfig = section(ReliefConfig, "Fine relief from shading (Mono13 8).")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."
     )

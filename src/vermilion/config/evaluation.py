@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ReferenceConfig(StageConfig):
-    """How a vertex finds its counterpart in the truth."""
+    """Correspondence of vertices and the truth."""
 
     max_distance_mm: float = Field(
         6.0,
@@ -59,8 +59,8 @@ class MeasuresConfig(StageConfig):
         1.0,
         gt=0.0,
         le=10.0,
-        description="A result is falsely open where the lips touch in truth and its gap is over "
-        "this (mm).",
+        description="A result is falsely open where the lips touch in truth and its gap is larger "
+        "(mm).",
     )
     through_mm: float = Field(
         0.05,
@@ -84,7 +84,7 @@ class ContourConfig(StageConfig):
     ridge: float = Field(
         0.02,
         gt=0.0,
-        description="Cost of a weight that moves the lips by 1 mm, beside a mean square distance of "
+        description="Cost of a weight that moves the lips by 1 mm, relative to a mean square distance of "
         "1 mm2 to the contours.",
     )
 
@@ -121,8 +121,8 @@ class EvaluationConfig(StageConfig):
         "inside; read by the evaluation alone. Empty: the studio's truth for the takes that the "
         "studio made, and the held-out reconstruction H for the others.",
     )
-    reference: ReferenceConfig = Field(
-        default_factory=ReferenceConfig, description="How a vertex finds its counterpart."
+    reference: ReferenceConfig = section(
+        ReferenceConfig, "Correspondence of vertices and the truth."
     )
     variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only", "paper"]] = (
         Field(
@@ -134,12 +134,6 @@ class EvaluationConfig(StageConfig):
     variants_of: list[Literal["PS", "MS", "GR"]] = Field(
         ["PS", "MS", "GR"], description="Regressors that the variants are made of."
     )
-    contour: ContourConfig = Field(
-        default_factory=ContourConfig, description="The contour baseline (Lips16 section 6)."
-    )
-    measures: MeasuresConfig = Field(
-        default_factory=MeasuresConfig, description="Figures and their intervals."
-    )
-    figures: FiguresConfig = Field(
-        default_factory=FiguresConfig, description="Images of the report."
-    )
+    contour: ContourConfig = section(ContourConfig, "The contour baseline (Lips16 section 6).")
+    measures: MeasuresConfig = section(MeasuresConfig, "Figures and their intervals.")
+    figures: FiguresConfig = section(FiguresConfig, "Images of the report.")

@@ -12,7 +12,7 @@ ICT_COMMIT = "da5f95a607f5e6b37755b38d3385d7f2853732e5"
 
 
 class FaceModelConfig(StageConfig):
-    """Which face model, where it lies, and how finely its three parts are meshed."""
+    """The face model, its files, and the resolution of its three meshes."""
 
     name: Literal["procedural", "ict"] = Field(
         "procedural",

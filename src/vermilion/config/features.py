@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ShapeFeaturesConfig(StageConfig):
@@ -28,8 +28,9 @@ class ContourFeaturesConfig(StageConfig):
 
     space: Literal["head", "image"] = Field(
         "head",
-        description="`head`: contours are put back on the tracked lips and measured in 3D, so that a "
-        "turn of the head is undone (Lips16 7). `image`: measured in the image (Lips16 5.1).",
+        description="`head`: contours are back-projected onto the tracked lips and measured in 3D, which "
+        "makes the features invariant to head rotation (Lips16 7). `image`: measured in the image "
+        "(Lips16 5.1).",
     )
     samples: int = Field(
         80, ge=20, le=400, description="Samples on each contour (a multiple of 20)."
@@ -38,20 +39,20 @@ class ContourFeaturesConfig(StageConfig):
         0.12,
         gt=0,
         le=0.5,
-        description="Reach of the search for the outer contour to either side of the model's.",
+        description="Search distance for the outer contour on either side of the model's.",
     )
     depth: float = Field(
-        0.3, gt=0, le=1, description="Reach of the search for the inner contour from the outer one."
+        0.3, gt=0, le=1, description="Search distance for the inner contour from the outer one."
     )
-    step: float = Field(0.0025, gt=0, le=0.05, description="Between places that are looked at.")
+    step: float = Field(0.0025, gt=0, le=0.05, description="Step of the search.")
     least_likelihood: float = Field(
-        0.2, ge=0, le=1, description="Likelihood of a maximum that counts as found."
+        0.2, ge=0, le=1, description="Least likelihood of a maximum that counts as found."
     )
     model_weight: float = Field(
         2.0,
         ge=0,
-        description="Cost of a contour one reach away from the model's (log-likelihood). Of the inner one it "
-        "is 9 times as much there, and half as much again at a quarter of a reach.",
+        description="Cost of a contour at the search distance from the model's (log-likelihood). For the "
+        "inner contour it is 9 times as large there, and 1.5 times at a quarter of the distance.",
     )
     smooth_weight: float = Field(
         0.6, ge=0, description="Cost of a slope of 1 between neighbouring samples (log-likelihood)."
@@ -77,9 +78,7 @@ class ContourFeaturesConfig(StageConfig):
 class FeaturesConfig(StageConfig):
     """The regressor's input."""
 
-    shape: ShapeFeaturesConfig = Field(
-        default_factory=ShapeFeaturesConfig, description="Shape coefficients of the coarse mesh."
+    shape: ShapeFeaturesConfig = section(
+        ShapeFeaturesConfig, "Shape coefficients of the coarse mesh."
     )
-    contours: ContourFeaturesConfig = Field(
-        default_factory=ContourFeaturesConfig, description="Relative contour distances."
-    )
+    contours: ContourFeaturesConfig = section(ContourFeaturesConfig, "Relative contour distances.")

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class DomainConfig(StageConfig):
@@ -19,17 +19,20 @@ class DomainConfig(StageConfig):
         14.0,
         ge=6.0,
         le=40.0,
-        description="How far the texture reaches onto the skin round the lips (mm).",
+        description="Width of the texture's margin of skin around the lips (mm).",
     )
     inner_mm: float = Field(
-        6.0, ge=0.0, le=20.0, description="How far it reaches inside the mouth, past the red (mm)."
+        6.0,
+        ge=0.0,
+        le=20.0,
+        description="Depth of the texture inside the mouth, past the vermilion (mm).",
     )
     edge_mm: float = Field(
         0.8,
         ge=0.0,
         le=5.0,
-        description="Surface closer than this to an occluding contour is not sampled (mm): about "
-        "the error of the meshes.",
+        description="Surface closer than this to an occluding contour is not sampled (mm); about the "
+        "error of the meshes.",
     )
 
 
@@ -40,7 +43,7 @@ class MaskConfig(StageConfig):
         4.0,
         ge=0.0,
         le=20.0,
-        description="The tattoo is looked for up to this far from the red of the lips (mm).",
+        description="Largest distance of the tattoo from the vermilion (mm).",
     )
     sensitivity: float = Field(
         6.0,
@@ -49,10 +52,10 @@ class MaskConfig(StageConfig):
         description="Colour differences of more than this many deviations of bare skin are tattoo.",
     )
     closing_mm: float = Field(
-        1.5, ge=0.0, le=10.0, description="Gaps of the pattern narrower than this are painted (mm)."
+        1.5, ge=0.0, le=10.0, description="Narrower gaps of the pattern are painted too (mm)."
     )
     border_mm: float = Field(
-        0.6, ge=0.0, le=5.0, description="Margin painted in full round the tattoo (mm)."
+        0.6, ge=0.0, le=5.0, description="Margin around the tattoo that is painted in full (mm)."
     )
     feather_mm: float = Field(
         1.0, ge=0.0, le=10.0, description="Width of the soft border outside that margin (mm)."
@@ -60,7 +63,7 @@ class MaskConfig(StageConfig):
 
 
 class ShadingConfig(StageConfig):
-    """How the shading of a frame is carried over to the plain texture."""
+    """How the shading of a frame is transferred to the plain texture."""
 
     mode: Literal["ratio", "difference", "none"] = Field(
         "ratio",
@@ -77,7 +80,7 @@ class ShadingConfig(StageConfig):
         1.0,
         ge=0.0,
         le=5.0,
-        description="Skin closer than this to the painted region is not compared with (mm).",
+        description="Skin closer than this to the painted region is not used for the match (mm).",
     )
     limit: float = Field(
         2.5,
@@ -89,8 +92,8 @@ class ShadingConfig(StageConfig):
         1.0,
         ge=0.0,
         le=5.0,
-        description="Next to where the lips meet, shading is read along the inner contours, up to this "
-        "far from them (mm; `ratio` only, 0: not).",
+        description="Near the seam of the lips, shading is averaged along the inner contours up to this "
+        "distance from them (mm; `ratio` only; 0: nowhere).",
     )
     seam_along_mm: float = Field(
         4.0, ge=0.5, le=20.0, description="Gaussian average along the inner contours (mm)."
@@ -98,47 +101,53 @@ class ShadingConfig(StageConfig):
 
 
 class OpeningConfig(StageConfig):
-    """Where the mouth opens: the contours of the mesh, corrected by what the image shows."""
+    """The mouth opening: inner contours of the mesh, corrected by the image."""
 
     reach_mm: float = Field(
         2.5,
         ge=0.0,
         le=10.0,
-        description="Furthest correction of a contour (mm); 0: the mesh's own.",
+        description="Largest correction of a contour (mm); 0: none.",
     )
     step_mm: float = Field(
-        0.12, ge=0.02, le=1.0, description="Step of that search (mm), half a pixel at least."
+        0.12, ge=0.02, le=1.0, description="Step of the search (mm); at least half a pixel."
     )
     clear_mm: float = Field(
         1.0,
         ge=0.0,
         le=5.0,
-        description="Lips closer than this to the mesh's contour do not teach the tattoo's colours (mm).",
+        description="Lips closer than this to the mesh's contour are not samples of the tattoo's colours (mm).",
     )
     inside_mm: float = Field(
         0.3,
         ge=0.0,
         le=5.0,
-        description="The opening closer than this to the mesh's contour does not teach the colours of "
-        "the mouth's inside (mm).",
+        description="Pixels of the opening closer than this to the mesh's contour are not samples of the "
+        "colours inside the mouth (mm).",
     )
     black: float = Field(
-        0.2, ge=0.01, le=10.0, description="Weight of black among those colours (theirs: 1)."
+        0.2,
+        ge=0.01,
+        le=10.0,
+        description="Weight of black among the colours inside the mouth, relative to the samples.",
     )
     teeth: float = Field(
-        0.3, ge=0.0, le=10.0, description="Weight of the colours of teeth among them (theirs: 1)."
+        0.3, ge=0.0, le=10.0, description="Weight of the colours of teeth, relative to the samples."
     )
     unlike: float = Field(
         0.2, ge=0.001, le=0.9, description="Share of the inside that may have any colour (0 to 1)."
     )
     sure: float = Field(
-        4.0, ge=0.5, le=20.0, description="Logarithm of a ratio of likelihoods that counts in full."
+        4.0,
+        ge=0.5,
+        le=20.0,
+        description="Largest logarithm of a likelihood ratio that counts in full.",
     )
     prior: float = Field(
         1.0,
         ge=0.0,
         le=1000.0,
-        description="Cost of a contour one millimetre off the mesh's (points of the search).",
+        description="Cost of a contour at 1 mm from the mesh's (points of the search).",
     )
     smooth: float = Field(
         0.6, ge=0.0, le=100.0, description="Cost of a bend by one point (points of the search)."
@@ -156,8 +165,8 @@ class CompositeConfig(StageConfig):
         1.0,
         ge=0.0,
         le=10.0,
-        description="Pixels of the mouth opening this close to the lips are freed of the tattoo that "
-        "the lens mixed into them (pixels).",
+        description="Pixels of the mouth opening within this distance of the lips are corrected for the "
+        "tattoo's colour that lens blur mixed in (pixels).",
     )
     grain: bool = Field(True, description="Add the noise that the image has and the texture lacks.")
     seed: int = Field(0, ge=0, description="Seed of that noise.")
@@ -166,16 +175,10 @@ class CompositeConfig(StageConfig):
 class InpaintConfig(StageConfig):
     """Removal of the lip tattoo (Lips16 3.2.1)."""
 
-    domain: DomainConfig = Field(
-        default_factory=DomainConfig, description="The patch of the lips in texture space."
-    )
-    mask: MaskConfig = Field(default_factory=MaskConfig, description="Where the tattoo is.")
-    shading: ShadingConfig = Field(
-        default_factory=ShadingConfig, description="How shading is carried over."
-    )
-    opening: OpeningConfig = Field(
-        default_factory=OpeningConfig, description="Where the mouth opens."
-    )
-    composite: CompositeConfig = Field(
-        default_factory=CompositeConfig, description="How the texture is rendered into a frame."
+    domain: DomainConfig = section(DomainConfig, "The patch of the lips in texture space.")
+    mask: MaskConfig = section(MaskConfig, "Where the tattoo is.")
+    shading: ShadingConfig = section(ShadingConfig, "How shading is transferred.")
+    opening: OpeningConfig = section(OpeningConfig, "The mouth opening.")
+    composite: CompositeConfig = section(
+        CompositeConfig, "How the texture is rendered into a frame."
     )

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class NetworksConfig(StageConfig):
@@ -22,8 +22,8 @@ class NetworksConfig(StageConfig):
         2,
         ge=1,
         le=8,
-        description="Crops a face: the first where its box lets landmarks be expected, the others "
-        "round the landmarks of the crop before (count).",
+        description="Crops a face (count): the first from its box, the others around the landmarks of "
+        "the previous crop.",
     )
 
 
@@ -69,7 +69,7 @@ class LandmarkFilesConfig(StageConfig):
 class LandmarkTrainingConfig(StageConfig):
     """The embedded regressor: supervised descent (Xiong and De la Torre 2013)."""
 
-    stages: int = Field(5, ge=1, le=10, description="Regressions in a row (count).")
+    stages: int = Field(5, ge=1, le=10, description="Successive regressions (count).")
     ridge: float = Field(
         0.1, gt=0, le=100, description="Ridge parameter, relative to the features' mean variance."
     )
@@ -104,8 +104,7 @@ class KeyFramesConfig(StageConfig):
         0.025,
         gt=0,
         le=1,
-        description="Initial key frames: the share of a take's frames that look most like the "
-        "first.",
+        description="Initial key frames: the share of a take's frames that are most similar to the first.",
     )
     max_clip: int = Field(
         50,
@@ -113,9 +112,9 @@ class KeyFramesConfig(StageConfig):
         le=100_000,
         description="Longer clips between key frames are divided (frames).",
     )
-    csv: LandmarkFilesConfig = Field(
-        default_factory=LandmarkFilesConfig,
-        description="Landmarks of another tracker, frame by frame, that count as key frames where "
+    csv: LandmarkFilesConfig = section(
+        LandmarkFilesConfig,
+        "Landmarks of another tracker, frame by frame, that count as key frames where "
         "the file exists and the tracker was sure.",
     )
 
@@ -125,16 +124,16 @@ class LandmarkCorrectionConfig(StageConfig):
 
     mode: Literal["raw", "flow"] = Field(
         "raw",
-        description="`raw`: as detected. `flow`: blended with what flow carries from the key frames "
-        "before and after; costs about 0.1 s a frame.",
+        description="`raw`: as detected. `flow`: blended with landmarks that flow carries from the key "
+        "frames before and after; costs about 0.1 s a frame.",
     )
     mouth: float = Field(0.1, ge=0, le=1, description="Weight of the detector at the mouth.")
     inner_lips: float = Field(
         0.5,
         ge=0,
         le=1,
-        description="Weight of the detector at the inner lip contour, an outline, which flow follows "
-        "by the lip beside it (0.1: as the rest of the mouth, Mono13).",
+        description="Weight of the detector at the inner lip contour. The contour is an outline; flow "
+        "follows the lip beside it. (0.1: as the rest of the mouth, as in Mono13.)",
     )
     eyes: float = Field(0.5, ge=0, le=1, description="Weight of the detector at the eyes.")
     jaw: float = Field(0.2, ge=0, le=1, description="Weight of the detector along the jaw.")
@@ -149,8 +148,8 @@ class LandmarkCorrectionConfig(StageConfig):
         0.03,
         gt=0,
         le=1,
-        description="Flow that fails to lead back to where it came from by this much, summed from "
-        "the key frame on, counts half (face sizes).",
+        description="Flow with this forward-backward error, summed from the key frame, counts half "
+        "(face sizes).",
     )
 
 
@@ -176,20 +175,12 @@ class LandmarksConfig(StageConfig):
         default_factory=list,
         description="`trained`, or in place of `mediapipe`: takes (subject/take) whose captures hold labels/landmarks/.",
     )
-    networks: NetworksConfig = Field(
-        default_factory=NetworksConfig, description="The ONNX networks."
-    )
-    csv: LandmarkFilesConfig = Field(
-        default_factory=LandmarkFilesConfig, description="Files of another tracker."
-    )
-    training: LandmarkTrainingConfig = Field(
-        default_factory=LandmarkTrainingConfig, description="The embedded regressor."
-    )
-    key_frames: KeyFramesConfig = Field(
-        default_factory=KeyFramesConfig, description="Frames whose landmarks are trusted."
-    )
-    correction: LandmarkCorrectionConfig = Field(
-        default_factory=LandmarkCorrectionConfig, description="Correction by flow between them."
+    networks: NetworksConfig = section(NetworksConfig, "The ONNX networks.")
+    csv: LandmarkFilesConfig = section(LandmarkFilesConfig, "Files of another tracker.")
+    training: LandmarkTrainingConfig = section(LandmarkTrainingConfig, "The embedded regressor.")
+    key_frames: KeyFramesConfig = section(KeyFramesConfig, "Frames whose landmarks are trusted.")
+    correction: LandmarkCorrectionConfig = section(
+        LandmarkCorrectionConfig, "Correction by flow between them."
     )
 
     @model_validator(mode="after")

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
+from vermilion.config.cross_checks import cross_checks
 from vermilion.config.moved import moved_keys, new_key
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
@@ -45,7 +47,7 @@ def load_configuration(
     takes, wrong = read_takes(str(sheet))
     problems += wrong
     if configuration is not None:
-        problems += _cross_checks(configuration, takes, origin)
+        problems += [f"{origin}, key {problem}" for problem in cross_checks(configuration, takes)]
     if check_disk:
         reading = AS_TAGGED if configuration is None else configuration.capture.reading
         for take in takes:
@@ -122,86 +124,13 @@ def _refused(present: dict[int, Path], take: Take, reading: ImageReading) -> lis
     return [reason] if reason else []
 
 
-def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) -> list[str]:
-    problems = []
-    subjects = {take.subject for take in takes}
-    by_name = {take.name: take for take in takes}
-    studio = configuration.studio.subjects
-    for take in takes:
-        if take.source == STUDIO and take.subject not in studio:
-            problems.append(
-                f"{origin}, key studio.subjects: found {sorted(studio)}; expected "
-                f"also '{take.subject}', as take {take.name} has the source `studio`."
-            )
-    for name in studio:
-        if name not in subjects:
-            problems.append(
-                f"{origin}, key studio.subjects.{name}: found a subject without takes; "
-                "expected a row of the take sheet. Add one or remove the subject."
-            )
-    for name, scan in configuration.tracking.scans.items():
-        key = f"{origin}, key tracking.scans.{name}"
-        if name not in subjects:
-            problems.append(
-                f"{key}: found a subject without takes; expected one of {', '.join(sorted(subjects))}."
-            )
-        if configuration.landmarks.detector == "csv" and not scan.landmarks:
-            problems.append(
-                f"{key}.landmarks: found nothing; expected a file, as landmarks.detector is `csv` and "
-                "nothing looks for landmarks in images."
-            )
-    for name in configuration.apply.takes:
-        if name not in by_name:
-            problems.append(
-                f"{origin}, key apply.takes: found '{name}'; expected a take of the "
-                f"sheet, written subject/take: {', '.join(by_name) or 'none there'}."
-            )
-    for name in configuration.apply.takes:
-        if name in by_name and by_name[name].role not in ("video", "tattoo"):
-            problems.append(
-                f"{origin}, key apply.takes: found '{name}' of role {by_name[name].role}; expected "
-                "role video or tattoo. Only these have the features that a regressor needs."
-            )
-    with_rig = {take.subject for take in takes if take.role == "tattoo"}
-    for name, frame in configuration.correction.neutral_frames.items():
-        key, take = f"{origin}, key correction.neutral_frames", by_name.get(name)
-        if take is None or take.role != "video" or take.subject not in with_rig:
-            problems.append(
-                f"{key}: found '{name}'; expected a take of role video of a subject who has a take of "
-                "role tattoo, written subject/take. Correct or remove it."
-            )
-        elif not take.first <= frame <= take.last:
-            problems.append(
-                f"{key}.{name}: found frame {frame}; expected one of {take.first} to {take.last}, the "
-                "frames of the take."
-            )
-    refined = {
-        "takes": configuration.detail.takes,
-        "relief.takes": configuration.detail.relief.takes,
-    }
-    for key, names in refined.items():
-        for name in names:
-            if name not in by_name or by_name[name].role not in ("video", "tattoo"):
-                problems.append(
-                    f"{origin}, key detail.{key}: found '{name}'; expected a take of the sheet of "
-                    "role video or tattoo, written subject/take."
-                )
-    for name in configuration.landmarks.training_takes:
-        if name not in by_name:
-            problems.append(
-                f"{origin}, key landmarks.training_takes: found '{name}'; expected a "
-                f"take of the sheet, written subject/take."
-            )
-    return problems
-
-
-def _is_moved(item: dict[str, Any]) -> bool:
+def _is_moved(item: ErrorDetails) -> bool:
     """Whether an error of the schema is an unknown key that has moved."""
     key = ".".join(str(part) for part in item["loc"])
     return item["type"] == "extra_forbidden" and new_key(key) is not None
 
 
-def _sentence(origin: str, item: dict[str, Any]) -> str:
+def _sentence(origin: str, item: ErrorDetails) -> str:
     key = ".".join(str(part) for part in item["loc"]) or "(top level)"
     found = item.get("input")
     if item["type"] == "extra_forbidden":

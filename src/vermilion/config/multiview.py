@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class ImageConfig(StageConfig):
@@ -33,13 +33,16 @@ class StereoConfig(StageConfig):
         "viewing direction, similar resolution).",
     )
     reach_mm: float = Field(
-        70.0, gt=5, le=500, description="Depth of the face round its landmarks' centre (mm)."
+        70.0,
+        gt=5,
+        le=500,
+        description="Depth range of the face around the centre of its landmarks (mm).",
     )
     block_px: int = Field(
         5, ge=1, le=21, description="Matching window of semi-global matching (px)."
     )
     uniqueness_percent: int = Field(
-        5, ge=0, le=50, description="Margin by which the best disparity must win (percent)."
+        5, ge=0, le=50, description="Margin of the best disparity over the second best (percent)."
     )
     consistency_px: float = Field(
         1.0, gt=0, le=5, description="Largest left-right disagreement of a disparity (px)."
@@ -62,7 +65,7 @@ class NeutralConfig(StageConfig):
     """Registration of the template to the neutral frame."""
 
     min_confidence: float = Field(
-        0.3, ge=0, le=1, description="Landmarks of a view below this confidence are left out."
+        0.3, ge=0, le=1, description="Least confidence of a landmark that is used."
     )
     landmark_distance_mm: float = Field(
         4.0,
@@ -77,7 +80,7 @@ class NeutralConfig(StageConfig):
         15.0,
         gt=1,
         le=100,
-        description="Stiffness of the deformation onto the landmarks: details below it stay (mm).",
+        description="Stiffness of the deformation onto the landmarks: finer details do not change (mm).",
     )
     first_gate_mm: float = Field(
         20.0, gt=1, le=100, description="Largest distance of a matched point, first round (mm)."
@@ -116,8 +119,8 @@ class NeutralConfig(StageConfig):
     )
     same_points: bool = Field(
         True,
-        description="Later takes of a person carry the same points of the skin as the first: the first "
-        "one's neutral is registered to theirs by the images. Off: each take for itself.",
+        description="All takes of a person have the same points of the skin: the neutral of the first take "
+        "is registered to later takes by the images. Off: each take has its own points.",
     )
 
 
@@ -152,7 +155,7 @@ class TrackConfig(StageConfig):
         24,
         ge=3,
         le=10_000,
-        description="Frames of a clip between two anchor frames, about; each clip is a job (frames).",
+        description="Approximate length of a clip between two anchor frames; each clip is a job (frames).",
     )
 
 
@@ -167,7 +170,7 @@ class RefineConfig(StageConfig):
     lengths_mm: list[float] = Field(
         [2.5, 1.0],
         min_length=1,
-        description="Stiffness of each round: details below it come from the neutral (mm).",
+        description="Stiffness of each round: finer details come from the neutral (mm).",
     )
     sigma_px: float = Field(
         0.3, gt=0.01, le=10, description="Expected error of a flow vector (px)."
@@ -179,7 +182,7 @@ class RefineConfig(StageConfig):
         8.0, gt=0.1, le=100, description="Longest motion of a vertex in a round (mm)."
     )
     ray_stride_px: int = Field(
-        2, ge=1, le=8, description="Distance of the rays that predict an image (px)."
+        2, ge=1, le=8, description="Spacing of the rays that predict an image (px)."
     )
     cloud_scale: float = Field(
         0.5,
@@ -207,7 +210,7 @@ class RefineConfig(StageConfig):
 
 
 class DriftConfig(StageConfig):
-    """Drift against the anchor: the neutral's images carried to each frame by its mesh."""
+    """Drift against the anchor: the neutral's images warped to each frame by its mesh."""
 
     scale: float = Field(
         0.5,
@@ -219,7 +222,7 @@ class DriftConfig(StageConfig):
         0.3, ge=0, le=0.99, description="Smallest correlation of a flow vector's surroundings."
     )
     ray_stride_px: int = Field(
-        2, ge=1, le=8, description="Distance of the rays that carry an image (px)."
+        2, ge=1, le=8, description="Spacing of the rays that warp an image (px)."
     )
 
 
@@ -230,10 +233,13 @@ class ReportConfig(StageConfig):
         3,
         ge=0,
         le=50,
-        description="Frames shown at even distances, besides the neutral and the worst ones.",
+        description="Evenly spaced frames that are shown, besides the neutral and the worst frames.",
     )
     flagged_frames: int = Field(
-        2, ge=0, le=50, description="Flagged frames shown, those of the largest drift first."
+        2,
+        ge=0,
+        le=50,
+        description="Flagged frames that are shown, those of the largest drift first.",
     )
     image_px: int = Field(
         200, ge=80, le=800, description="Width and height of an image of a sheet (px)."
@@ -251,30 +257,20 @@ class ReportConfig(StageConfig):
         12.0,
         gt=0.1,
         le=200,
-        description="Size of the page; sheets are made smaller to keep to it (MB).",
+        description="Largest size of the page; sheets are scaled down to it (MB).",
     )
 
 
 class MultiviewConfig(StageConfig):
     """From calibrated cameras to **H**, the registered high-quality mesh sequence."""
 
-    images: ImageConfig = Field(default_factory=ImageConfig, description="Preparation of images.")
-    stereo: StereoConfig = Field(default_factory=StereoConfig, description="Dense matching.")
-    neutral: NeutralConfig = Field(
-        default_factory=NeutralConfig, description="Template to the neutral frame."
-    )
-    track: TrackConfig = Field(
-        default_factory=TrackConfig, description="Coarse track with anchor frames (Beeler 2011)."
-    )
-    refine: RefineConfig = Field(
-        default_factory=RefineConfig, description="Registration of each frame to the neutral."
-    )
-    drift: DriftConfig = Field(
-        default_factory=DriftConfig, description="Drift of each frame against the neutral."
-    )
-    report: ReportConfig = Field(
-        default_factory=ReportConfig, description="The report page of a take."
-    )
+    images: ImageConfig = section(ImageConfig, "Preparation of images.")
+    stereo: StereoConfig = section(StereoConfig, "Dense matching.")
+    neutral: NeutralConfig = section(NeutralConfig, "Template to the neutral frame.")
+    track: TrackConfig = section(TrackConfig, "Coarse track with anchor frames (Beeler 2011).")
+    refine: RefineConfig = section(RefineConfig, "Registration of each frame to the neutral.")
+    drift: DriftConfig = section(DriftConfig, "Drift of each frame against the neutral.")
+    report: ReportConfig = section(ReportConfig, "The report page of a take.")
 
     @model_validator(mode="after")
     def _rounds_agree(self) -> MultiviewConfig:

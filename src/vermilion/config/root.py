@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from vermilion.config.apply import ApplyConfig
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 from vermilion.config.capture import CaptureConfig
 from vermilion.config.contours import ContoursConfig
 from vermilion.config.correction import CorrectionConfig
@@ -38,59 +38,34 @@ class Configuration(StageConfig):
         100,
         ge=1,
         le=100_000,
-        description="Frames a job (frames). Changes no result; 100 locally, 250 to 300 on a cluster.",
+        description="Frames of a job (frames). It changes no result; 100 locally, 250 to 300 on a cluster.",
     )
     skip_takes: dict[str, str] = Field(
         default_factory=dict,
         description="Takes (subject/take) to leave out -> the reason, which quality.tsv repeats. `make run` "
         "leaves out takes that fail by itself.",
     )
-    face_model: FaceModelConfig = Field(
-        default_factory=FaceModelConfig, description="The face model."
+    face_model: FaceModelConfig = section(FaceModelConfig, "The face model.")
+    studio: StudioConfig = section(StudioConfig, "Synthetic captures (embedded default).")
+    capture: CaptureConfig = section(CaptureConfig, "Checks of captures, calibration (Lips16 3.1).")
+    multiview: MultiviewConfig = section(
+        MultiviewConfig, "The high-quality mesh sequence (Lips16 3.1)."
     )
-    studio: StudioConfig = Field(
-        default_factory=StudioConfig, description="Synthetic captures (embedded default)."
+    inpaint: InpaintConfig = section(InpaintConfig, "Removal of the lip tattoo (Lips16 3.2.1).")
+    landmarks: LandmarksConfig = section(LandmarksConfig, "66 landmarks a frame (Mono13 5).")
+    tracking: TrackingConfig = section(TrackingConfig, "The coarse monocular track (Lips16 3.2).")
+    detail: DetailConfig = section(
+        DetailConfig, "The detailed sequence: flow and relief (Mono13 7, 8)."
     )
-    capture: CaptureConfig = Field(
-        default_factory=CaptureConfig, description="Checks of captures, calibration (Lips16 3.1)."
+    contours: ContoursConfig = section(
+        ContoursConfig, "Lip contour likelihood maps (Lips16 3.2.2)."
     )
-    multiview: MultiviewConfig = Field(
-        default_factory=MultiviewConfig, description="The high-quality mesh sequence (Lips16 3.1)."
+    correspondence: CorrespondenceConfig = section(
+        CorrespondenceConfig, "Triangle-to-triangle map between the two topologies (Lips16 4.1)."
     )
-    inpaint: InpaintConfig = Field(
-        default_factory=InpaintConfig, description="Removal of the lip tattoo (Lips16 3.2.1)."
-    )
-    landmarks: LandmarksConfig = Field(
-        default_factory=LandmarksConfig, description="Landmarks of every frame (Mono13 5)."
-    )
-    tracking: TrackingConfig = Field(
-        default_factory=TrackingConfig, description="The coarse monocular track (Lips16 3.2)."
-    )
-    detail: DetailConfig = Field(
-        default_factory=DetailConfig, description="A finer sequence than C (Mono13 7)."
-    )
-    contours: ContoursConfig = Field(
-        default_factory=ContoursConfig, description="Lip contour likelihood maps (Lips16 3.2.2)."
-    )
-    correspondence: CorrespondenceConfig = Field(
-        default_factory=CorrespondenceConfig,
-        description="Triangle-to-triangle map between the two topologies (Lips16 4.1).",
-    )
-    features: FeaturesConfig = Field(
-        default_factory=FeaturesConfig, description="Features of a frame (Lips16 5.1)."
-    )
-    correction: CorrectionConfig = Field(
-        default_factory=CorrectionConfig, description="The correction layer (Lips16 4.2)."
-    )
-    database: DatabaseConfig = Field(
-        default_factory=DatabaseConfig, description="The training database (Lips16 3)."
-    )
-    training: TrainingConfig = Field(
-        default_factory=TrainingConfig, description="Regressors (Lips16 5.2)."
-    )
-    evaluation: EvaluationConfig = Field(
-        default_factory=EvaluationConfig, description="Measures and report (Lips16 6)."
-    )
-    apply: ApplyConfig = Field(
-        default_factory=ApplyConfig, description="Correction of ordinary video (Lips16 6)."
-    )
+    features: FeaturesConfig = section(FeaturesConfig, "Features of a frame (Lips16 5.1).")
+    correction: CorrectionConfig = section(CorrectionConfig, "The correction layer (Lips16 4.2).")
+    database: DatabaseConfig = section(DatabaseConfig, "The training database (Lips16 3).")
+    training: TrainingConfig = section(TrainingConfig, "Regressors (Lips16 5.2).")
+    evaluation: EvaluationConfig = section(EvaluationConfig, "Measures and report (Lips16 6).")
+    apply: ApplyConfig = section(ApplyConfig, "Correction of ordinary video (Lips16 6).")

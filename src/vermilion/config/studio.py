@@ -23,12 +23,12 @@ class StudioTake(StageConfig):
         0,
         ge=0,
         le=100,
-        description="`generated` only: how many different mouth poses the curves visit, again and "
-        "again (0: all, more than twenty). Few poses suit short takes.",
+        description="`generated` only: number of different mouth poses that the curves repeat (0: all, "
+        "more than twenty). Few poses suit short takes.",
     )
     pose_seconds: tuple[float, float] = Field(
         (0.22, 0.42),
-        description="`generated` only: shortest and longest time that a pose takes to come (s).",
+        description="`generated` only: shortest and longest transition into a pose (s).",
     )
     csv: str | None = Field(
         None, description="`live_link` only: the CSV file with ARKit weights, one row a frame."
@@ -143,4 +143,4 @@ class StudioConfig(StageConfig):
     contour_labels: int = Field(
         6, ge=0, le=1000, description="Labelled contour frames of a take (frames)."
     )
-    seed: int = Field(0, ge=0, description="Seed that all others are mixed with.")
+    seed: int = Field(0, ge=0, description="Seed that is combined with all other seeds.")

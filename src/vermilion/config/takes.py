@@ -6,7 +6,7 @@ import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 from vermilion.config.frame_range import frame_range
 from vermilion.storage.errors import InputError
@@ -27,8 +27,8 @@ class Take:
         subject, take: names, letters, digits, `_` and `.` only.
         role: `tattoo`, `plain`, `video` or `tracked`.
         source: capture folder, frame folder or video file; `studio` for the embedded default.
-        first, last: frame numbers, both included. The first is the neutral. Left empty in the sheet,
-            they are those of the source on disk.
+        first, last: frame numbers, both included. The first frame shows the neutral. Left empty in the
+            sheet, they are those of the source on disk.
         fps: frames a second.
         split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
             rest trains).
@@ -62,7 +62,7 @@ class Take:
         return self.split != "train"
 
     def test_frames(self) -> list[int]:
-        """Frames that evaluation measures: held out of training, and meant as a test."""
+        """Frames that the evaluation measures: held out of training, of a take with a test split."""
         return [] if self.split == "none" else [f for f in self.frames if self.held_out(f)]
 
     def train_frames(self) -> list[int]:
@@ -120,7 +120,7 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
     if not value["source"]:
         wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
-    numbers = {}
+    numbers: dict[str, float] = {}
     open_ends = [name for name in ("first", "last") if not value[name]]
     for name, kind in (("first", int), ("last", int), ("fps", float)):
         if name in open_ends:
@@ -156,14 +156,17 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
                 )
     if wrong:
         return None, wrong
-    return Take(
+    take = Take(
         value["subject"],
         value["take"],
-        value["role"],
-        value["source"],  # type: ignore
-        split=split,
-        **numbers,
-    ), []
+        cast(Role, value["role"]),
+        value["source"],
+        int(numbers["first"]),
+        int(numbers["last"]),
+        numbers["fps"],
+        split,
+    )
+    return take, []
 
 
 def _with_range(

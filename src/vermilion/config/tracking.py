@@ -1,4 +1,4 @@
-"""Configuration of the tracking stage: what is typical of landmarks, faces and heads."""
+"""Configuration of the tracking stage: landmark fit, identity, meshes, other trackers, scans."""
 
 from __future__ import annotations
 
@@ -6,39 +6,51 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
-from vermilion.config.image_fit import ImageFitConfig, OffsetsConfig
+from vermilion.config.base import StageConfig, section
+from vermilion.config.image_fit import (
+    ColourTermConfig,
+    ImageFitConfig,
+    OffsetsConfig,
+    acceleration,
+)
+
+
+def _per_interocular(default: float, part: str) -> float:
+    """A fraction of the inter-ocular distance, for a part of the face."""
+    return Field(default, gt=0, le=1, description=f"{part} (inter-ocular distances).")
 
 
 class LandmarkGroups(StageConfig):
-    """One number for each part of the face, as a fraction of the inter-ocular distance."""
+    """Deviation of a detected landmark between frames, for each part of the face."""
 
-    jaw: float = Field(0.05, gt=0, le=1, description="Jaw line (inter-ocular distances).")
-    brows: float = Field(0.03, gt=0, le=1, description="Brows (inter-ocular distances).")
-    nose: float = Field(0.02, gt=0, le=1, description="Nose (inter-ocular distances).")
-    eyes: float = Field(0.015, gt=0, le=1, description="Eyes (inter-ocular distances).")
-    mouth: float = Field(0.015, gt=0, le=1, description="Mouth (inter-ocular distances).")
+    jaw: float = _per_interocular(0.05, "Jaw line")
+    brows: float = _per_interocular(0.03, "Brows")
+    nose: float = _per_interocular(0.02, "Nose")
+    eyes: float = _per_interocular(0.015, "Eyes")
+    mouth: float = _per_interocular(0.015, "Mouth")
 
 
 class LandmarkBiases(StageConfig):
-    """How far a person's landmarks lie from the model's in all frames alike."""
+    """Deviation of a person's detected landmarks from the model's that is constant over all frames."""
 
-    jaw: float = Field(0.08, gt=0, le=1, description="Jaw line (inter-ocular distances).")
-    brows: float = Field(0.05, gt=0, le=1, description="Brows (inter-ocular distances).")
-    nose: float = Field(0.04, gt=0, le=1, description="Nose (inter-ocular distances).")
-    eyes: float = Field(0.04, gt=0, le=1, description="Eyes (inter-ocular distances).")
-    mouth: float = Field(0.04, gt=0, le=1, description="Mouth (inter-ocular distances).")
+    jaw: float = _per_interocular(0.08, "Jaw line")
+    brows: float = _per_interocular(0.05, "Brows")
+    nose: float = _per_interocular(0.04, "Nose")
+    eyes: float = _per_interocular(0.04, "Eyes")
+    mouth: float = _per_interocular(0.04, "Mouth")
 
 
 class ModelFitConfig(StageConfig):
-    """How much landmarks, and how much blend weights, are trusted."""
+    """Noise of the landmarks and prior of the blend weights."""
 
-    noise: LandmarkGroups = Field(
-        default_factory=LandmarkGroups,
-        description="Deviation of a detected landmark from one frame to another.",
+    noise: LandmarkGroups = section(
+        LandmarkGroups, "Deviation of a detected landmark between frames."
     )
     robust_sigmas: float = Field(
-        3.0, gt=0.5, le=100, description="A landmark this far off counts half (deviations)."
+        3.0,
+        gt=0.5,
+        le=100,
+        description="A landmark with an error of this many deviations counts half (deviations).",
     )
     weight_sigma: float = Field(
         0.5, gt=0.01, le=100, description="Deviation of a blend weight about zero."
@@ -47,53 +59,49 @@ class ModelFitConfig(StageConfig):
         0.1,
         ge=0,
         le=1,
-        description="How far the place along the jaw line counts: 0, it slides freely; 1, fully.",
+        description="Weight of a landmark's error along the jaw line: 0, it slides freely; 1, it counts in full.",
     )
 
 
-class IdentityImagesConfig(StageConfig):
-    """The person from the images as well: shape, albedo and light together (Lips16 3.2)."""
+class IdentityImagesConfig(ColourTermConfig):
+    """The person from landmarks and images: shape, albedo and light together (Lips16 3.2)."""
 
     enabled: bool = Field(
-        True, description="Fit the person to the images of these frames; off: to landmarks alone."
+        True, description="Fit the person to the images of the frames too; off: to landmarks alone."
     )
     spacing_mm: float = Field(
-        5.0, ge=0.5, le=20, description="Between places where model and image are compared (mm)."
+        5.0,
+        ge=0.5,
+        le=20,
+        description="Distance between samples at which model and image are compared (mm).",
     )
     pixel_mm: float = Field(
-        8.0, ge=0.1, le=20, description="Pixel of the image that is compared (mm at the face)."
-    )
-    sigma: float = Field(
-        6.0, gt=0, le=255, description="Deviation of a colour (display values, 0 to 255)."
-    )
-    robust_sigmas: float = Field(
-        2.0, gt=0.1, le=100, description="A place this far off counts half (deviations)."
+        8.0, ge=0.1, le=20, description="Pixel size of the image that is compared (mm at the face)."
     )
     strength: float = Field(
-        10.0, ge=0, le=1e6, description="How many independent places a face is worth."
+        10.0, ge=0, le=1e6, description="Weight of a face's image, in independent samples."
     )
     albedo_prior: float = Field(
         0.5,
         ge=0,
         le=100,
-        description="How many frames' worth the skin's one colour counts at each place.",
+        description="Weight of the skin's median colour at each sample, in frames.",
     )
     rounds: int = Field(
-        3, ge=1, le=20, description="Turns of light and visibility with the rest (count)."
+        3, ge=1, le=20, description="Rounds; each estimates light and visibility anew (count)."
     )
-    iterations: int = Field(4, ge=1, le=50, description="Gauss-Newton steps of a turn (count).")
+    iterations: int = Field(4, ge=1, le=50, description="Gauss-Newton steps of a round (count).")
 
 
 class IdentityConfig(StageConfig):
     """The person, from a few frames of all of a subject's takes."""
 
     frames: int = Field(
-        16, ge=1, le=200, description="Frames of all takes together, evenly spread (count)."
+        16, ge=1, le=200, description="Frames of all takes together, evenly spaced (count)."
     )
-    bias: LandmarkBiases = Field(
-        default_factory=LandmarkBiases,
-        description="Deviation of the person's landmarks, as the detector sees them, from the "
-        "model's, the same in all frames.",
+    bias: LandmarkBiases = section(
+        LandmarkBiases,
+        "Deviation of the person's detected landmarks from the model's, constant over all frames.",
     )
     neutral_weight_sigma: float = Field(
         0.03,
@@ -108,41 +116,23 @@ class IdentityConfig(StageConfig):
         le=2,
         description="Deviation of the logarithm of an unknown focal length about the assumed one.",
     )
-    images: IdentityImagesConfig = Field(
-        default_factory=IdentityImagesConfig, description="The person from the images as well."
+    images: IdentityImagesConfig = section(
+        IdentityImagesConfig, "The person from landmarks and images."
     )
 
 
 class MotionConfig(StageConfig):
     """Pose and blend weights of each frame (Mono13 6)."""
 
-    rotation_acceleration_deg: float = Field(
-        400.0,
-        gt=0,
-        le=1e9,
-        description="Typical angular acceleration of a head (degrees per second squared); smaller "
-        "is smoother.",
-    )
-    translation_acceleration_mm: float = Field(
-        600.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a head (mm per second squared); smaller is smoother.",
-    )
-    weight_acceleration: float = Field(
-        60.0,
-        gt=0,
-        le=1e9,
-        description="Typical acceleration of a blend weight (per second squared); smaller is "
-        "smoother.",
-    )
+    rotation_acceleration_deg: float = acceleration(400.0, "a head's rotation", "degrees")
+    translation_acceleration_mm: float = acceleration(600.0, "a head", "mm")
+    weight_acceleration: float = acceleration(60.0, "a blend weight", "1")
     iterations: int = Field(15, ge=1, le=200, description="Gauss-Newton steps, at most (count).")
     max_reprojection: float = Field(
         0.12,
         gt=0,
         le=2,
-        description="Frames whose landmarks miss the model by more are flagged (inter-ocular "
-        "distances, root mean square).",
+        description="Frames with a larger RMS reprojection error are flagged (inter-ocular distances).",
     )
 
 
@@ -161,7 +151,7 @@ class ExternalConfig(StageConfig):
         None,
         gt=0,
         le=1e6,
-        description="Length of a unit in the files (mm). Empty: USD files say it, others are in mm.",
+        description="Length of a unit in the files (mm). Empty: the unit of a USD file, 1 for the others.",
     )
 
 
@@ -169,48 +159,41 @@ class ScanConfig(StageConfig):
     """A 3D scan of a person, from which the tracker's model of that person is made (Mono13 4)."""
 
     path: str = Field(
-        min_length=1, description="OBJ, PLY or STL of a head or face: any topology, unit and frame."
+        min_length=1,
+        description="OBJ, PLY or STL of a head or face, of any topology, unit and frame.",
     )
-    eyes: Literal["open", "closed"] = Field("open", description="Whether the scan's lids are shut.")
+    eyes: Literal["open", "closed"] = Field("open", description="State of the scan's eyelids.")
     landmarks: str | None = Field(
         None,
-        description="Landmarks given by hand: a TSV with columns landmark (0 to 65), x, y, z in the "
-        "scan's frame. Empty: they are found in rendered views.",
+        description="Landmarks placed by hand: a TSV with columns landmark (0 to 65), x, y, z in the "
+        "scan's frame. Empty: they are detected in rendered views.",
     )
     unit_mm: float | None = Field(
         None,
         gt=0,
         le=1e6,
-        description="Length of a unit in the file (mm). Empty: the size of the model's head.",
+        description="Length of a unit in the file (mm). Empty: estimated from the size of the model's head.",
     )
     finest_mm: float = Field(
         4.0,
         ge=1,
         le=50,
-        description="Detail of the scan that is finer is smoothed away (wavelength, mm).",
+        description="Finer detail of the scan is smoothed away (wavelength, mm).",
     )
 
 
 class TrackingConfig(StageConfig):
     """The coarse monocular track (Lips16 3.2, Mono13 6)."""
 
-    fit: ModelFitConfig = Field(
-        default_factory=ModelFitConfig, description="Trust in landmarks and blend weights."
-    )
-    identity: IdentityConfig = Field(default_factory=IdentityConfig, description="The person.")
-    motion: MotionConfig = Field(default_factory=MotionConfig, description="Pose and expression.")
-    image_fit: ImageFitConfig = Field(
-        default_factory=ImageFitConfig, description="Pose and expression from the images."
-    )
-    offsets: OffsetsConfig = Field(
-        default_factory=OffsetsConfig, description="Offsets outside the model's space."
-    )
-    meshes: MeshesConfig = Field(default_factory=MeshesConfig, description="Meshes and overlays.")
+    fit: ModelFitConfig = section(ModelFitConfig, "Trust in landmarks and blend weights.")
+    identity: IdentityConfig = section(IdentityConfig, "The person.")
+    motion: MotionConfig = section(MotionConfig, "Pose and expression.")
+    image_fit: ImageFitConfig = section(ImageFitConfig, "Pose and expression from the images.")
+    offsets: OffsetsConfig = section(OffsetsConfig, "Offsets outside the model's space.")
+    meshes: MeshesConfig = section(MeshesConfig, "Meshes and overlays.")
     scans: dict[str, ScanConfig] = Field(
         default_factory=dict,
-        description="Subject -> scan, for those whose face model comes from one; the others' comes "
-        "from the identity that their takes show.",
+        description="Subject -> scan from which the subject's face model is made. The other subjects' "
+        "models come from the identity fitted to their takes.",
     )
-    external: ExternalConfig = Field(
-        default_factory=ExternalConfig, description="Mesh sequences of other trackers."
-    )
+    external: ExternalConfig = section(ExternalConfig, "Mesh sequences of other trackers.")

@@ -21,19 +21,22 @@ class TrainingConfig(StageConfig):
         "The others can be evaluated beside it (`evaluation.variants`).",
     )
     prototype_stride: int = Field(
-        10, ge=1, le=1000, description="Every how many training frames become a prototype (frames)."
+        10,
+        ge=1,
+        le=1000,
+        description="Stride of the training frames that become prototypes (frames).",
     )
     prototype_minimum: int = Field(
         20,
         ge=1,
         le=10_000,
-        description="At least so many prototypes where there are as many frames: the stride is "
-        "shortened for short takes.",
+        description="Fewest prototypes, if there are as many frames: the stride is shortened for short "
+        "takes.",
     )
     scaling: Literal["group", "feature"] = Field(
         "group",
-        description="What shares a scale. `group`: the shape coefficients, and the distances, each "
-        "keep their own proportions. `feature`: every feature has the same variance.",
+        description="Scaling of the features. `group`: one scale for the shape coefficients and one for "
+        "the distances. `feature`: every feature has the same variance.",
     )
     alphas: list[Positive] = Field(
         [1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0],
@@ -59,40 +62,40 @@ class TrainingConfig(StageConfig):
     kernel_betas: list[Positive] = Field(
         [0.1, 0.3, 1.0, 3.0],
         min_length=1,
-        description="Scales of the kernel regressor's bumps that cross-validation tries.",
+        description="Scales of the kernel regressor's Gaussians that cross-validation tries.",
     )
     kernel_linear: float = Field(
         1.0,
         ge=0.0,
-        description="Variance of the kernel regressor's linear part beside that of the smooth one.",
+        description="Variance of the kernel regressor's linear part, relative to the smooth part.",
     )
     kernel_equalise: float = Field(
         0.5,
         ge=0.0,
         le=1.0,
-        description="With `scaling: group`, how far the kernel regressor brings the features of a "
-        "group to one variance: 0 keeps their proportions, 1 makes them equal.",
+        description="With `scaling: group`, how far the kernel regressor equalises the variances of the "
+        "features of a group: 0 keeps their ratios, 1 makes them equal.",
     )
     folds: int = Field(5, ge=2, le=50, description="Folds of the cross-validation.")
     clip_frames: int = Field(
         30,
         ge=1,
         le=10_000,
-        description="Length of the clips that are held out whole (frames); shorter where there are "
-        "too few frames for the folds.",
+        description="Length of the clips that are held out as a whole (frames); shorter if there are too "
+        "few frames for the folds.",
     )
     reach: float = Field(
         0.0,
         ge=0.0,
-        description="How far beyond the range of the training a feature counts, as a share of that "
-        "range. Further out it is held, and the prediction is drawn to the mean of the training. A "
-        "large number gives the paper's regressors, which fall back to their bias (RBF) or run away "
-        "(affine) there.",
+        description="Distance beyond the training's range up to which a feature counts, as a share of the "
+        "range. Farther out the feature is clamped and the prediction fades to the training's mean. A "
+        "large number gives the paper's regressors, which there fall back to their bias (RBF) or grow "
+        "without bound (affine).",
     )
     fade: Positive = Field(
         2.0,
-        description="How far beyond the reach half of the prediction is left, in distances of the "
-        "training from its mean (root mean square of the scaled features).",
+        description="Distance beyond the reach at which half of the prediction is left, in units of the "
+        "training's RMS distance from its mean (scaled features).",
     )
     choice: Literal["simplest", "least"] = Field(
         "least",
@@ -104,27 +107,26 @@ class TrainingConfig(StageConfig):
         0.03,
         ge=0.0,
         lt=1.0,
-        description="Predictions are made in a basis of few layers, the principal components of what "
-        "is predicted. How much leaving the others out may change a prediction (root mean square, as "
-        "a share of that of the predictions about their mean); 0 leaves nothing out.",
+        description="Predictions use a basis of few layers: principal components of the predictions. "
+        "Largest change of the predictions by the truncation (RMS, as a share of the predictions' RMS "
+        "about their mean); 0: no truncation.",
     )
     bias: Literal["person", "shared"] = Field(
         "person",
-        description="`person`: each person of the training has a bias of their own, which takes the "
-        "identity in the layers, and is used again where the same person is corrected. `shared`: one "
-        "bias, as in the paper.",
+        description="`person`: each person of the training has a bias of their own. It absorbs the "
+        "identity in the layers and is used when the same person is corrected. `shared`: one bias, as "
+        "in the paper.",
     )
     anchor: Literal["neutral", "none"] = Field(
         "neutral",
-        description="What features are measured from. `neutral`: those of a person's neutral frame, of "
-        "all whose neutral is known (in the training, or by a rig take of their own). `none`: features "
-        "as they are, as in the paper. With `bias: shared` always the latter.",
+        description="Origin of the features. `neutral`: the features of the person's neutral frame, for "
+        "all people whose neutral is known (from the training, or from a rig take of their own). "
+        "`none`: zero, as in the paper. With `bias: shared` always `none`.",
     )
     novelty_quantile: float = Field(
         0.99,
         gt=0.0,
         le=1.0,
-        description="A corrected frame is reported as outside the training's span where its novelty "
-        "is above that of this share of the training frames, each judged by a training without its "
-        "clips.",
+        description="A corrected frame is reported as outside the training's range if its novelty exceeds "
+        "this quantile of the training frames' novelty, measured by cross-validation.",
     )

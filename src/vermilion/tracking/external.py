@@ -1,15 +1,18 @@
-"""Coarse mesh sequences of other trackers: a folder of OBJ or PLY, an `.npz`, or USD.
+"""Coarse mesh sequences of other trackers: a folder of OBJ or PLY files, an `.npz`, or USD.
 
-A take with role `tracked` brings such a sequence instead of images.
+A take with role `tracked` has such a sequence instead of images.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_mesh
 from vermilion.imaging.numbering import numbered_files
 from vermilion.storage.errors import InputError
@@ -22,8 +25,8 @@ class MeshSequence:
     """Meshes of one topology.
 
     Attributes:
-        frames: (F,) int.
-        vertices_mm: (F, V, 3) float32.
+        frames: (F,) int numbers.
+        vertices_mm: (F, V, 3) float32, world.
         triangles: (T, 3) int32.
     """
 
@@ -33,7 +36,7 @@ class MeshSequence:
 
 
 def read_tracked(
-    source: str | Path, frames: list[int], unit_mm: float | None = None, **place
+    source: str | Path, frames: list[int], unit_mm: float | None = None, **place: Any
 ) -> MeshSequence:
     """Read some frames of a mesh sequence.
 
@@ -41,11 +44,12 @@ def read_tracked(
         source: folder of numbered `.obj` or `.ply`; `.npz` with `vertices_mm` (F, V, 3),
             `triangles` (T, 3) and optionally `frames` (F,), else counted from 0; or a USD file
             with one animated mesh, whose time codes are the frames.
-        frames: frame numbers.
-        unit_mm: millimetres a unit of the file. By default USD's own unit; 1 for the others.
+        frames: numbers of the frames to read.
+        unit_mm: length of the file's unit, mm; None: USD's own unit, 1 for the others.
+        place: subject and take, for error messages.
 
     Raises:
-        InputError: a frame is missing, or its topology differs, or the file is none of these.
+        InputError: a frame is missing, its topology differs, or the file has none of these forms.
     """
     source = Path(source)
     if source.is_dir():
@@ -68,24 +72,24 @@ def read_tracked(
 
 def _read_folder(folder: Path, frames: list[int], place: dict) -> MeshSequence:
     paths = numbered_files(folder, MESH_SUFFIXES)
-    vertices, triangles = [], None
+    meshes: list[Mesh] = []
     for frame in frames:
         if frame not in paths:
             raise _missing(frame, paths, folder, place)
         mesh = read_mesh(paths[frame])
-        triangles = mesh.triangles if triangles is None else triangles
-        if not np.array_equal(mesh.triangles, triangles):
+        if meshes and not np.array_equal(mesh.triangles, meshes[0].triangles):
             raise InputError(
                 f"another topology ({len(mesh.triangles)} triangles) than in frame {frames[0]} "
-                f"({len(triangles)} triangles)",
+                f"({len(meshes[0].triangles)} triangles)",
                 "one topology a take",
                 "Export all frames of one mesh, with vertex order kept.",
                 frame=frame,
                 path=paths[frame],
                 **place,
             )
-        vertices.append(mesh.vertices_mm)
-    return MeshSequence(np.array(frames), np.array(vertices, dtype=np.float32), triangles)
+        meshes.append(mesh)
+    vertices = np.array([mesh.vertices_mm for mesh in meshes], dtype=np.float32)
+    return MeshSequence(np.array(frames), vertices, meshes[0].triangles)
 
 
 def _read_npz(path: Path, frames: list[int], place: dict) -> MeshSequence:
@@ -156,7 +160,7 @@ def _read_usd(path: Path, frames: list[int], place: dict, own_unit: bool) -> Mes
 
 
 def _fans(counts: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Triangles (T, 3) of convex polygons."""
+    """Triangles (T, 3) of convex polygons: corner counts (P,), corners (sum of counts,)."""
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     triangles = []
     for extra in range(2, counts.max(initial=0)):
@@ -167,7 +171,7 @@ def _fans(counts: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.concatenate(triangles).astype(np.int32)
 
 
-def _missing(frame: int, present, path: Path, place: dict) -> InputError:
+def _missing(frame: int, present: Iterable[int], path: Path, place: dict) -> InputError:
     known = sorted(present)
     span = f"frames {known[0]} to {known[-1]}" if known else "no numbered frames"
     return InputError(

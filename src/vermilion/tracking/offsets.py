@@ -1,12 +1,12 @@
-"""The medium-scale corrective layer outside the model's space (Lips16 3.2).
+"""Vertex offsets outside the model's space: the medium-scale corrective layer of Lips16 3.2.
 
-Offsets of the vertices parallel to the image, where the image tells something of them, by
-Gauss-Newton on
+The offsets d are parallel to the image. Gauss-Newton minimises
 
     strength / 2 * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + 1 / (2 sigma^2 length^2) * integral of |d|^2 + length^4 |Laplacian d|^2
 
-over the surface: d is a smooth random field of deviation `sigma_mm`, alike over `length_mm`.
+over the surface: the prior takes d for a smooth random field of deviation `sigma_mm` that is
+correlated over `length_mm`.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 from vermilion.imaging.display import display_slope, to_display_values
-from vermilion.tracking.image_fit.frame_fit import View
+from vermilion.tracking.image_fit.frame_fit import FrameView
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
 
 
 @dataclass(frozen=True)
-class LayerSettings:
-    """How far and how finely the layer may bend the model.
+class OffsetSettings:
+    """How far and how finely the offsets may bend the model.
 
     Attributes:
         sigma_mm: deviation of the offsets.
-        length_mm: over which they are alike.
-        sigma, robust_sigmas, strength: of the image, as in `PhotometricSettings`.
-        iterations: Gauss-Newton steps at each resolution, coarsest first; 0 skips one.
+        length_mm: correlation length of the offsets.
+        sigma, robust_sigmas, strength: of the image, as in `FrameFitSettings`.
+        iterations: Gauss-Newton steps at each resolution, coarsest first; 0 skips a resolution.
     """
 
     sigma_mm: float = 2.0
@@ -48,8 +48,8 @@ class LayerSettings:
     iterations: Sequence[int] = (0, 1, 2)
 
 
-class CorrectiveLayer:
-    """Offsets of one person's mesh; what does not depend on the frame is made once."""
+class OffsetSolver:
+    """Solves for the offsets of one person's mesh; the parts shared by all frames are made once."""
 
     def __init__(
         self,
@@ -57,8 +57,9 @@ class CorrectiveLayer:
         neutral_mm: np.ndarray,
         face: SampledFace,
         appearance: Appearance,
-        settings: LayerSettings,
+        settings: OffsetSettings,
     ):
+        """`neutral_mm` (V, 3) is the person's, head frame; `face` is sampled as `appearance` is."""
         self.face, self.appearance, self.settings = face, appearance, settings
         self.at = appearance.samples.matrix(model.triangles, model.n_vertices)
         laplacian, mass = cotangent_laplacian(neutral_mm, model.triangles)
@@ -68,8 +69,8 @@ class CorrectiveLayer:
         stiffness = sparse.diags(areas) + s.length_mm**4 * bending
         self.stiffness = sparse.csr_matrix(stiffness / (s.sigma_mm * s.length_mm) ** 2)
 
-    def solve(self, view: View) -> np.ndarray:
-        """Offsets (V, 3) mm in the head frame, the model being at `view.start`."""
+    def solve(self, view: FrameView) -> np.ndarray:
+        """Offsets (V, 3) mm, head frame, of the frame whose pose and weights are `view.start`."""
         x = view.start
         rotation = rotation_matrix(x[:3]) @ view.reference
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))

@@ -21,7 +21,17 @@ _SIDE_PX = 480
 def draw_tracked(
     image: np.ndarray, camera: Camera, vertices_mm: np.ndarray, model: FaceModel
 ) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with the mesh, half transparent, and its two lip contours."""
+    """A copy of an image with the half-transparent mesh and its two lip contours.
+
+    Args:
+        image: (h, w, 3) uint8.
+        camera: of the image.
+        vertices_mm: (V, 3), world.
+        model: topology and contours of the mesh.
+
+    Returns:
+        (h, w, 3) uint8. A camera with distortion gets the contours alone.
+    """
     if not camera.is_pinhole:
         return _draw_outline(image, camera, vertices_mm, model)
     drawn = draw_mesh(image, camera, vertices_mm, model.triangles, opacity=0.5)
@@ -45,13 +55,18 @@ def tracking_overlay(
     count: int,
     columns: int = 3,
 ) -> np.ndarray:
-    """Frames of a chunk, evenly spread, cut to the face, with mesh, contours and landmarks.
+    """Evenly spaced frames of a chunk, cropped to the face, with mesh, contours and landmarks.
 
     Args:
+        source: images of the take.
+        camera: of the images.
+        model: topology and contours of the meshes.
         frames: (F,) numbers.
-        vertices_mm: (F, V, 3) in the world.
+        vertices_mm: (F, V, 3), world.
         landmarks: of these frames or more.
-        valid: (F,).
+        valid: (F,) bool; the others are labelled "not tracked".
+        count: frames to show, at most.
+        columns: of the sheet.
 
     Returns:
         (h, w, 3) uint8.
@@ -67,13 +82,16 @@ def tracking_overlay(
         drawn = draw_tracked(image, camera, vertices_mm[index], model)
         if frame in rows:
             drawn = draw_points(drawn, landmarks.points_px[rows[frame]], (0, 255, 0), 1)
-        crop = cut_to(drawn, camera.project(vertices_mm[index]))
+        crop = crop_to_points(drawn, camera.project(vertices_mm[index]))
         images.append(label(crop, f"{frame}" if valid[index] else f"{frame}: not tracked"))
     return tile(images, columns)
 
 
-def cut_to(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
-    """The square round points, resized to 480 x 480; black outside the image."""
+def crop_to_points(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:
+    """The square around points (N, 2) px of an image (h, w, 3), resized to (480, 480, 3).
+
+    `margin` is a share of the square's side; black outside the image.
+    """
     low, high = np.nanmin(points_px, axis=0), np.nanmax(points_px, axis=0)
     half = 0.5 * (1 + 2 * margin) * max(float((high - low).max()), 8.0)
     corner = 0.5 * (low + high) - half

@@ -1,4 +1,4 @@
-"""What tracking leaves in files: the person (`identity.npz`) and the take's motion (`fit.npz`)."""
+"""Files of the tracking stage: the person (`identity.npz`) and the take's motion (`fit.npz`)."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Identity:
     Attributes:
         identity: (I,) in standard deviations.
         neutral_mm: (V, 3) in the head frame.
-        landmark_offset_mm: (N, 3) in the head frame: where the detector sees the neutral's
-            landmarks, less where the model has them.
+        landmark_offset_mm: (N, 3) in the head frame: the neutral's landmarks as detected, minus
+            the model's.
         takes: (T,) str, all of the subject's takes that were used.
-        focal_px: (T,) known or estimated.
-        calibrated: (T,) bool, whether it was known.
+        focal_px: (T,) focal lengths, known or estimated.
+        calibrated: (T,) bool, whether the focal length was known.
         places: where the N landmarks lie on the model; None: the 66 vertices that it names.
     """
 
@@ -95,12 +95,12 @@ class TrackedTake:
 
     Attributes:
         frames: (F,) int.
-        weights: (F, K) in [0, 1], in the order of `expression_names`.
+        weights: (F, K) blend weights in [0, 1], in the order of `expression_names`.
         expression_names: (K,) str.
         world_from_head_rotation: (F, 3, 3).
         world_from_head_translation_mm: (F, 3).
         valid: (F,) bool; poses and weights of the others are interpolated.
-        reprojection_px: (F,) RMS over the landmarks but the jaw's; NaN where none were found.
+        reprojection_px: (F,) RMS over all landmarks except the jaw's; NaN where none were found.
         camera_name, camera_model, camera_params, camera_size_px, cam_from_world: the camera of the
             images, with the focal length that was used.
     """
@@ -127,7 +127,15 @@ class TrackedTake:
         camera: Camera,
         model: FaceModel,
     ) -> TrackedTake:
-        """Motion relative to the camera, carried to the world."""
+        """Motion relative to the camera, carried to the world.
+
+        Args:
+            frames: (F,) int numbers.
+            motion: of these frames, camera from head.
+            valid: (F,) bool, frames that can be trusted.
+            camera: of the images, with the focal length that was used.
+            model: the tracker's.
+        """
         to_world = camera.rotation.T
         return cls(
             frames=np.asarray(frames),
@@ -159,8 +167,8 @@ class TrackedTake:
             self.cam_from_world,
         )
 
-    def index_of(self, frames: np.ndarray | list[int]) -> np.ndarray:
-        """Rows of frame numbers. Raises KeyError where one is not in the take."""
+    def index_of(self, frames: np.ndarray | Sequence[int]) -> np.ndarray:
+        """Rows (n,) of `frames` (n,), their numbers. Raises KeyError where one is not in the take."""
         rows = {int(frame): row for row, frame in enumerate(self.frames)}
         return np.array([rows[int(frame)] for frame in frames], dtype=np.int64)
 
@@ -171,9 +179,9 @@ class TrackedTake:
         rows: np.ndarray,
         offsets_mm: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Meshes of some rows in the world, (len(rows), V, 3).
+        """Meshes (n, V, 3) mm of some rows (n,) int, world.
 
-        `offsets_mm` (len(rows), V, 3) in the head frame are added to the model's vertices.
+        `offsets_mm` (n, V, 3) in the head frame are added to the model's vertices.
         """
         local = model.vertices(identity.identity, self.weights[rows])
         if offsets_mm is not None:

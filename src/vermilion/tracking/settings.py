@@ -1,27 +1,29 @@
-"""Settings of the fits from plain values, as a configuration section holds them."""
+"""Settings of the landmark fits from the plain values of their configuration sections."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from vermilion.tracking.identity.landmark_identity import IdentitySettings
-from vermilion.tracking.landmark_fit.expression import FitSettings
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise
 
 
-def fit_settings(fit: dict[str, Any], motion: dict[str, Any] | None = None) -> FitSettings:
-    """Of the sections `tracking.fit` and `tracking.motion`."""
+def landmark_fit_settings(
+    fit: dict[str, Any], motion: dict[str, Any] | None = None
+) -> LandmarkFitSettings:
+    """Settings of the sections `tracking.fit` and `tracking.motion`."""
     motion = {k: v for k, v in (motion or {}).items() if k != "max_reprojection"}
     noise = LandmarkNoise(**fit["noise"], robust_sigmas=fit["robust_sigmas"])
-    return FitSettings(
+    return LandmarkFitSettings(
         noise=noise, weight_sigma=fit["weight_sigma"], jaw_slide=fit["jaw_slide"], **motion
     )
 
 
 def identity_settings(fit: dict[str, Any], identity: dict[str, Any]) -> IdentitySettings:
-    """Of the sections `tracking.fit` and `tracking.identity`."""
+    """Settings of the sections `tracking.fit` and `tracking.identity`."""
     return IdentitySettings(
-        fit=fit_settings(fit),
+        fit=landmark_fit_settings(fit),
         bias=LandmarkNoise(**identity["bias"]),
         neutral_weight_sigma=identity["neutral_weight_sigma"],
         focal_sigma=identity["focal_sigma"],

@@ -10,12 +10,12 @@ from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.result import TrackedTake
 
 
-def fits(
+def valid_frames(
     motion: HeadMotion, shape: LandmarkShape, focal_px: float, max_reprojection: float
 ) -> np.ndarray:
-    """Frames (F,) bool whose landmarks were found and lie near the model's.
+    """Frames (F,) bool whose landmarks were found and whose reprojection error is small enough.
 
-    Near: within `max_reprojection` inter-ocular distances, root mean square.
+    `max_reprojection` is the largest RMS error, in inter-ocular distances.
     """
     interocular_px = focal_px * shape.interocular_mm / motion.translation_mm[:, 2]
     with np.errstate(invalid="ignore"):
@@ -23,7 +23,7 @@ def fits(
 
 
 def quality_rows(take: TrackedTake, rows: np.ndarray) -> list[QualityRow]:
-    """Quality rows of some rows of a tracked take."""
+    """Quality rows of some rows (n,) int of a tracked take."""
     result = []
     for row in rows:
         error, valid = float(take.reprojection_px[row]), bool(take.valid[row])

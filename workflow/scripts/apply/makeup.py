@@ -16,7 +16,7 @@ from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence
-from vermilion.tracking.image_fit.overlay import to_vertices
+from vermilion.tracking.image_fit.overlay import samples_to_vertices
 from vermilion.tracking.result import Identity, TrackedTake
 
 NAMES = ("original", "make-up", "checkerboard")
@@ -39,7 +39,7 @@ def main(snakemake):
     overlay = OverlayConfig(**params.cfg["apply.overlay"])
     model, neutral = FaceModel.load(inputs.tracker), Identity.load(inputs.identity).neutral_mm
     fit, found = TrackedTake.load(inputs.fit), Appearance.load(inputs.appearance)
-    albedo = to_vertices(
+    albedo = samples_to_vertices(
         found.albedo[0], np.minimum(found.seen, 1.0), found.samples, model.triangles, len(neutral)
     )
     layers = pigments(model, neutral, options)

@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 
 from vermilion.capture.board import Board
+from vermilion.capture.calibrate import CalibrationSettings
 from vermilion.capture.manifest import load_manifest
 from vermilion.capture.overlay import (
     calibration_sheet,
@@ -13,10 +14,11 @@ from vermilion.capture.overlay import (
     refinement_sheet,
     worst_view,
 )
-from vermilion.capture.refine import RefineSettings, refine_cameras
+from vermilion.capture.refine import refine_cameras
 from vermilion.capture.rig import calibration_views, image_sizes, rig_cameras
-from vermilion.capture.tracks import MatchSettings, find_features
-from vermilion.config.capture import CalibrationConfig, RefinementConfig
+from vermilion.capture.rig_poses import RigRefinementSettings
+from vermilion.capture.tracks import FeatureMatchSettings, find_features
+from vermilion.config.capture import CalibrationConfig, RigRefinementConfig
 from vermilion.geometry.camera import write_cameras
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import read_image, write_srgb8
@@ -31,6 +33,11 @@ def wanted(cfg, rig):
     """Whether a refinement is to be tried."""
     methods = ("given", "charuco", "checkerboard") if cfg.board_calibrated else ("given",)
     return cfg.mode != "off" and len(rig.cameras) > 1 and rig.method in methods
+
+
+def settings_from(kind, cfg):
+    """Settings of a class from the keys of a section that have the same names."""
+    return kind(**{f.name: getattr(cfg, f.name) for f in fields(kind)})
 
 
 def features_of(source, rig, frames, cfg):
@@ -52,10 +59,8 @@ def refinement(cfg, rig, manifest, first, last):
     """The rig refined over some frames, or as it was with the reason."""
     frames = sorted({int(f) for f in np.linspace(first, last, cfg.frames).round()})
     source = open_frames(manifest.source, manifest.subject, manifest.take)
-    values = cfg.model_dump()
     matching, settings = (
-        kind(**{f.name: values[f.name] for f in fields(kind)})
-        for kind in (MatchSettings, RefineSettings)
+        settings_from(kind, cfg) for kind in (FeatureMatchSettings, RigRefinementSettings)
     )
     images = features_of(source, rig, frames, cfg)
     made = refine_cameras(rig.cameras, images, matching, settings, cfg.mode == "auto")
@@ -75,7 +80,7 @@ def refinement(cfg, rig, manifest, first, last):
 
 
 def overlay(rig, manifest, neutral, made):
-    """Points of the refinement, the worst board view of each camera, or the neutral in each."""
+    """The refinement's points, the worst board view of each camera, or the neutral's images."""
     if rig.calibration is not None:
         folder = folder_of(manifest.source, "calibration")
         moments = {name: worst_view(rig.calibration, name) for name in rig.cameras}
@@ -106,14 +111,11 @@ def main(snakemake):
         image_sizes(manifests),
         snakemake.params.camera,
         board,
-        cfg.camera_model,
-        cfg.refine_principal_point,
-        cfg.max_view_px,
-        cfg.assumed_focal,
+        settings_from(CalibrationSettings, cfg),
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )
-    refine = RefinementConfig(**snakemake.params.cfg["capture.refinement"])
+    refine = RigRefinementConfig(**snakemake.params.cfg["capture.refinement"])
     summary, made = rig.summary(), None
     first, last = snakemake.params.frames
     if wanted(refine, rig):

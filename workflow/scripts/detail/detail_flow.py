@@ -1,8 +1,8 @@
-"""The coarse meshes of a chunk corrected by six-frame flow, their residuals and a checkerboard."""
+"""Correct the coarse meshes of a chunk by six-frame flow; residuals and a checkerboard."""
 
 from vermilion.detail.flow.chunk import correct_frames
 from vermilion.detail.flow.deformation import DeformationSettings
-from vermilion.detail.flow.frame import CorrectionSettings, FlowCorrection
+from vermilion.detail.flow.frame import FlowCorrection, FlowCorrectionSettings
 from vermilion.detail.flow.overlay import checkerboard_sheet
 from vermilion.detail.flow.six_frame_flow import FlowSettings
 from vermilion.faces.model import FaceModel
@@ -30,7 +30,7 @@ def main(snakemake):
         path, row = places[frame]
         return read_sequence(path)[row]
 
-    settings = CorrectionSettings(
+    settings = FlowCorrectionSettings(
         cfg["detail.face_px"],
         FlowSettings(**cfg["detail.flow"]),
         DeformationSettings(**cfg["detail.deformation"]),

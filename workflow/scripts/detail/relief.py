@@ -2,24 +2,25 @@
 
 from dataclasses import fields
 
-from vermilion.detail.relief.frames import Scene, relief_of
+from vermilion.detail.relief.frames import ReliefScene, relief_of_frames
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.relief import ReliefSettings
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
 from vermilion.storage.logfile import log_to
 
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     topology = FineTopology.of(FaceModel.load(inputs.tracker), cfg["detail.relief.levels"])
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
     span = (params.frames[0], params.frames[-1])
-    scene = Scene.open(topology, inputs, params.source, place, span, cfg)
+    scene = ReliefScene.open(topology, inputs, source, span, cfg["detail.relief.face_px"])
     settings = ReliefSettings(
         **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
     )
-    relief_of(scene, params.frames, ClipLight.load(inputs.light), settings).save(
+    relief_of_frames(scene, params.frames, ClipLight.load(inputs.light), settings).save(
         snakemake.output.relief
     )
 

@@ -1,10 +1,11 @@
 """One light, albedo and noise of a take from its first frames, and the topology of its relief."""
 
-from vermilion.detail.relief.frames import Scene
+from vermilion.detail.relief.frames import ReliefScene
 from vermilion.detail.relief.light import estimate_light
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.export.objs import write_obj
 from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 
@@ -15,14 +16,15 @@ def main(snakemake):
     topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    scene = Scene.open(topology, inputs, params.source, place, (first, last), cfg)
+    source = open_frames(params.source, *place)
+    scene = ReliefScene.open(topology, inputs, source, (first, last), cfg["detail.relief.face_px"])
     frames, seen = range(first, min(first + cfg["detail.relief.light_frames"], last + 1)), {}
     for frame in frames:
         try:
-            seen[frame] = scene.sight(frame, scene.fine(frame))
-        except (InputError, ValueError):  # no image, or the face is not in it: the others tell
+            seen[frame] = scene.observe(frame, scene.fine(frame))
+        except (InputError, ValueError):  # no image, or the face is not in it
             continue
-    if not any(sight.trust.any() for sight in seen.values()):
+    if not any(observed.trust.any() for observed in seen.values()):
         raise InputError(
             f"no face in the frames {frames[0]} to {frames[-1]}",
             "a first frame that shows the face",

@@ -1,13 +1,13 @@
-"""Relief with its normals averaged over a window of frames: meshes, normal maps, residuals."""
+"""Meshes with relief, their normals averaged over a window of frames; normal maps, residuals."""
 
 import numpy as np
 
 from vermilion.detail.relief.frames import (
     ReliefReader,
-    Scene,
-    errors_of,
-    refined,
-    residual_of,
+    ReliefScene,
+    mean_error,
+    mesh_with_relief,
+    shading_errors,
 )
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.normal_map import NormalMap
@@ -15,6 +15,7 @@ from vermilion.detail.relief.overlay import relief_panels
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
+from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_channels, write_srgb8
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
@@ -33,7 +34,8 @@ def main(snakemake):
     topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
     own = params.frames[0], params.frames[-1]
-    scene = Scene.open(topology, inputs, params.source, place, own, cfg)
+    source = open_frames(params.source, *place)
+    scene = ReliefScene.open(topology, inputs, source, own, cfg["detail.relief.face_px"])
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
@@ -42,7 +44,7 @@ def main(snakemake):
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):
             smooth = scene.fine(frame)
-            mesh = refined(topology, smooth, reader, frame, (first, last), window, weight)
+            mesh = mesh_with_relief(topology, smooth, reader, frame, (first, last), window, weight)
             drawn = maps.draw(smooth, mesh)
             names = zip("RGB", np.moveaxis(drawn, 2, 0), strict=True)
             write_channels(folder / f"{frame:06d}.exr", dict(names))
@@ -75,14 +77,14 @@ def residuals(scene, light, reader, frame, smooth, mesh):
     figures = {"residual_before": np.nan, "residual_after": np.nan, "relief_mm": relief}
     try:
         image = scene.read_image(frame)
-        sight = scene.sight(frame, smooth)
+        observed = scene.observe(frame, smooth)
     except (InputError, ValueError):
         return QualityRow(frame, False, reader.reason(frame) or "no image", figures), None, None
     before, after = (
-        errors_of(scene.topology, light, sight, m, scene.camera) for m in (smooth, mesh)
+        shading_errors(scene.topology, light, observed, m, scene.camera) for m in (smooth, mesh)
     )
-    figures["residual_before"] = residual_of(before, sight.trust)
-    figures["residual_after"] = residual_of(after, sight.trust)
+    figures["residual_before"] = mean_error(before, observed.trust)
+    figures["residual_after"] = mean_error(after, observed.trust)
     worse = figures["residual_after"] > figures["residual_before"]
     reason = "the relief explains the image worse" if worse else ""
     return QualityRow(frame, True, reason, figures), image, after

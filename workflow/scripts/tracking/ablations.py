@@ -1,4 +1,4 @@
-"""The residuals of all takes and steps as one table."""
+"""The photometric residuals of all takes and steps as one table."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Lighting and albedo of a take from frames that are chosen by themselves."""
+"""Lighting and albedo of a take from well-fitted frames that differ in pose and expression."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.image_fit.choose_frames import choose_frames
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
+from vermilion.tracking.image_fit.appearance_frames import choose_appearance_frames
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.overlay import appearance_image
 from vermilion.tracking.image_fit.take import TakeStart, learn_appearance
 
@@ -18,7 +18,7 @@ def main(snakemake):
     inputs, cfg = snakemake.input, snakemake.params.cfg
     options = cfg["tracking.image_fit.appearance"]
     fit, _, start = TakeStart.load(inputs, cfg)
-    rows = choose_frames(start.x, fit.valid, fit.reprojection_px, options["frames"])
+    rows = choose_appearance_frames(start.x, fit.valid, fit.reprojection_px, options["frames"])
     if len(rows) == 0:
         raise InputError(
             "no tracked frame",
@@ -29,7 +29,7 @@ def main(snakemake):
         )
     samples = sample_skin(start.model, options["spacing_mm"])
     face, source = start.face(samples), open_frames(snakemake.params.source, *place)
-    settings = PhotometricSettings(**cfg["tracking.image_fit.frame_fit"])
+    settings = FrameFitSettings(**cfg["tracking.image_fit.frame_fit"])
     views = []
     for row in rows:  # one whole image in memory at a time
         image = source.read(fit.camera.name, int(fit.frames[row]))

@@ -1,29 +1,22 @@
 """Pose and expression of each frame of a chunk from its image."""
 
-from vermilion.appearance.estimate import Appearance
+import numpy as np
+
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.tracking.image_fit.take import TakeStart, refine_frames
+from vermilion.tracking.image_fit.chunk import FrameChunk, fit_frames
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 
 
 def main(snakemake):
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    appearance = Appearance.load(inputs.appearance)
-    fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
-    face, source = start.face(appearance.samples), open_frames(params.source, *place)
-    settings = PhotometricSettings(**cfg["tracking.image_fit.frame_fit"])
-    problem = FrameProblem(face, appearance, settings, start.settings.weight_sigma)
-    refined = refine_frames(
-        start,
-        fit.valid[rows],
-        lambda index: source.read(fit.camera.name, int(params.frames[index])),
-        problem,
-        cfg["tracking.image_fit.appearance"]["pixel_mm"],
-    )
-    write_arrays(snakemake.output[0], frames=fit.frames[rows], **refined)
+    params, cfg = snakemake.params, snakemake.params.cfg
+    source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
+    chunk = FrameChunk.load(snakemake.input, source, cfg, params.frames)
+    settings = FrameFitSettings(**cfg["tracking.image_fit.frame_fit"])
+    weight_sigma = chunk.start.settings.weight_sigma
+    problem = FrameProblem(chunk.face, chunk.appearance, settings, weight_sigma)
+    write_arrays(snakemake.output[0], frames=np.array(params.frames), **fit_frames(chunk, problem))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """The identity of a subject from landmarks and images of sampled frames of its takes."""
 
-from dataclasses import fields
-
 import numpy as np
 
 from vermilion.faces.model import FaceModel
@@ -11,7 +9,8 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.tracking.identity.joint_identity import IdentityImageSettings, fit_joint_identity
+from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
+from vermilion.tracking.identity.joint_identity import fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import IdentityProblem
 from vermilion.tracking.identity.sampling import sample_takes
 from vermilion.tracking.image_fit.overlay import residual_sheet
@@ -20,7 +19,7 @@ from vermilion.tracking.result import Identity
 from vermilion.tracking.settings import identity_settings
 
 STEPS = ("landmarks", "with images")
-#: Frames of the overlay: no key, as another number would make all that follows the identity again.
+#: Frames of the overlay. Not a key: changing it would rerun everything that follows the identity.
 SHOWN = 4
 
 
@@ -40,16 +39,16 @@ def main(snakemake):
         sources[part.sample.name].read(part.camera.name, frame)
         for part, frame in progress(wanted, "images")
     ]
-    names = {field.name for field in fields(IdentityImageSettings)}
+    image_options = {k: v for k, v in options["images"].items() if k != "enabled"}
     joint = fit_joint_identity(
         tracker,
         IdentityProblem(tracker, samples, identity_settings(cfg["tracking.fit"], options)),
         images,
         [part.camera for part, _ in wanted],
-        IdentityImageSettings(**{k: v for k, v in options["images"].items() if k in names}),
+        IdentityImageSettings(**image_options),
     )
     sheets, residuals = [], []
-    for (part, frame), image, states in zip(wanted, images, joint.sheet, strict=True):
+    for (part, frame), image, states in zip(wanted, images, joint.residuals, strict=True):
         each = [photometric_residual(errors, trust) for errors, trust, _ in states]
         labels = [f"{step} {value:.2f}" for step, value in zip(STEPS, each, strict=True)]
         row = [(text, *state) for text, state in zip(labels, states, strict=True)]

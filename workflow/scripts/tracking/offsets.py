@@ -2,33 +2,26 @@
 
 import numpy as np
 
-from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_sequence
-from vermilion.tracking.image_fit.take import TakeStart, readable
-from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
+from vermilion.tracking.image_fit.chunk import FrameChunk
+from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 
 
 def main(snakemake):
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    appearance = Appearance.load(inputs.appearance)
-    fit, rows, start = TakeStart.load(inputs, cfg, params.frames)
-    face, source = start.face(appearance.samples), open_frames(params.source, *place)
+    params, cfg = snakemake.params, snakemake.params.cfg
+    source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
+    chunk = FrameChunk.load(snakemake.input, source, cfg, params.frames)
     options = {k: v for k, v in cfg["tracking.offsets"].items() if k != "enabled"}
-    settings = LayerSettings(**options)
-    layer = CorrectiveLayer(start.model, start.identity.neutral_mm, face, appearance, settings)
-    pixel_mm = cfg["tracking.image_fit.appearance"]["pixel_mm"]
-    offsets = np.zeros((len(rows), start.model.n_vertices, 3))
-
-    def read(index: int) -> np.ndarray:
-        return source.read(fit.camera.name, int(params.frames[index]))
-
-    # A frame that cannot be read keeps the model alone, as where nothing is seen.
-    for index, image in readable(fit.valid[rows], read, "corrective layer"):
-        view = start.view(index, image, face, pixel_mm, len(settings.iterations))
-        offsets[index] = layer.solve(view)
+    settings, start = OffsetSettings(**options), chunk.start
+    solver = OffsetSolver(
+        start.model, start.identity.neutral_mm, chunk.face, chunk.appearance, settings
+    )
+    # Frames that cannot be read keep offsets of zero, as vertices that no image shows do.
+    offsets = np.zeros((len(params.frames), start.model.n_vertices, 3))
+    for row, view in chunk.views(len(settings.iterations), "vertex offsets"):
+        offsets[row] = solver.solve(view)
     write_sequence(snakemake.output[0], offsets)
 
 

@@ -1,4 +1,4 @@
-"""What each step of the track leaves unexplained of a chunk's images, as tables and images."""
+"""Photometric residuals of a chunk after each step of the track, as tables and images."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from vermilion.tracking.image_fit.overlay import residual_sheet
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.settings import landmark_fit_settings
 
 
 def main(snakemake):
@@ -24,7 +24,7 @@ def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     tracker, person = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
     track, appearance = LandmarkTrack.load(inputs.landmarks), Appearance.load(inputs.appearance)
-    settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+    settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
     steps, starts = params.steps, {}
     for step in steps:
         fit = TrackedTake.load(inputs.landmark_fit if step == "landmarks" else inputs.fit)

@@ -1,4 +1,4 @@
-"""A chunk of a mesh sequence that another tracker made."""
+"""A chunk of another tracker's mesh sequence."""
 
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_sequence

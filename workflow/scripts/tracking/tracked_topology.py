@@ -1,4 +1,4 @@
-"""The topology of a mesh sequence that another tracker made."""
+"""The topology of another tracker's mesh sequence."""
 
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply

@@ -8,8 +8,8 @@ from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, with_focal
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
-from vermilion.tracking.validity import fits
+from vermilion.tracking.settings import landmark_fit_settings
+from vermilion.tracking.validity import valid_frames
 
 
 def main(snakemake):
@@ -22,10 +22,10 @@ def main(snakemake):
     )
     seen = Observations.of(track, camera)
     shape = LandmarkShape.of(tracker, person.identity, person.landmark_offset_mm)
-    settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+    settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
     motion = fit_motion(shape, seen, focal_px(camera), snakemake.params.fps, settings)
     limit = cfg["tracking.motion"]["max_reprojection"]
-    valid = fits(motion, shape, focal_px(camera), limit)
+    valid = valid_frames(motion, shape, focal_px(camera), limit)
     TrackedTake.of(track.frames, motion, valid, camera, tracker).save(snakemake.output.fit)
 
 

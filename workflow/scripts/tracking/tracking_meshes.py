@@ -1,4 +1,4 @@
-"""The coarse meshes of a chunk in the world, their quality rows, the model over the images."""
+"""The coarse meshes of a chunk in the world, their quality rows, and an overlay."""
 
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames

@@ -1,4 +1,4 @@
-"""What the data terms compare: colours and their gradients, with their own derivatives."""
+"""Channels that the data terms compare: colours and their gradients, with their derivatives."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ _BLUR_PX = 0.7
 
 
 def channels(image: np.ndarray) -> np.ndarray:
-    """Of (h, w, 3) display values, (h, w, 18) float32: `N_MAPS` times red, green, blue."""
+    """Channels (h, w, 18) float32 of `image` (h, w, 3), display values: `N_MAPS` times RGB."""
     smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)
     return np.concatenate([smooth, x, y, _across(x), _down(x), _down(y)], axis=2)
 
 
-def structure(image: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
-    """Unit direction across image structures, (h, w, 2) float32: main axis of the structure tensor."""
+def structure_direction(image: np.ndarray, scale_px: float = 1.5) -> np.ndarray:
+    """Unit direction (h, w, 2) across the structures of `image` (h, w, 3), float32.
+
+    The main axis of the structure tensor, averaged over `scale_px`.
+    """
     smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)
     parts = [(a * b).sum(axis=2) for a, b in ((x, x), (x, y), (y, y))]

@@ -1,4 +1,4 @@
-"""Correction of the frames of a chunk; what a frame becomes does not depend on the chunk."""
+"""Correction of the frames of a chunk; the result of a frame does not depend on the chunk."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class CorrectedChunk:
     """Meshes and figures of some frames.
 
     Attributes:
-        frames: (F,) int.
-        vertices_mm: (F, V, 3) in the world; the coarse mesh where a frame could not be corrected.
+        frames: (F,) int numbers.
+        vertices_mm: (F, V, 3), world; the coarse mesh where a frame could not be corrected.
         before, after, flow_px: (F,) as in `CorrectedFrame`; NaN where not corrected.
         reasons: F texts, empty where corrected.
     """
@@ -33,7 +33,7 @@ class CorrectedChunk:
     reasons: tuple[str, ...]
 
     def quality(self) -> list[QualityRow]:
-        """A row a frame; a frame whose image is explained worse than before is warned of."""
+        """A row a frame, with a warning where the photometric residual rose."""
         rows = []
         for frame, before, after, flow, reason in zip(
             self.frames, self.before, self.after, self.flow_px, self.reasons, strict=True
@@ -54,8 +54,11 @@ def correct_frames(
     """Correct frames one by one.
 
     Args:
-        span: first and last frame of the take; beyond them a frame stands in for its neighbour.
-        read_image: frame -> linear (h, w, 3), or InputError; read_mesh: frame -> (V, 3).
+        correction: of the take.
+        frames: numbers of the frames.
+        span: first and last frame of the take; at its ends a frame replaces its missing neighbour.
+        read_image: frame -> image (h, w, 3), linear RGB, or InputError.
+        read_mesh: frame -> coarse mesh (V, 3) mm, world.
     """
     image_of = lru_cache(maxsize=4)(read_image)
     results = []

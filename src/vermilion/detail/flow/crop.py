@@ -1,4 +1,4 @@
-"""The part of an image that shows the face, at the resolution at which flow is computed."""
+"""The part of an image that shows the face, at the working resolution."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vermilion.imaging.images import linear_to_srgb
 
 
 @dataclass(frozen=True)
-class Crop:
+class FaceCrop:
     """A rectangle of a camera's image, resized.
 
     Attributes:
         camera: the camera of the resized rectangle.
-        corner_px: (2,) int, left and top edge in the whole image.
-        size_px: (2,) int, width and height in the whole image.
+        corner_px: left and top edge in the whole image.
+        size_px: width and height in the whole image.
     """
 
     camera: Camera
@@ -26,10 +26,17 @@ class Crop:
     size_px: tuple[int, int]
 
     @classmethod
-    def around(cls, camera: Camera, points_px: np.ndarray, margin: float, most_px: int) -> Crop:
-        """Round points (..., 2) with a share of their extent as margin; at most `most_px` a side.
+    def around(cls, camera: Camera, points_px: np.ndarray, margin: float, most_px: int) -> FaceCrop:
+        """Crop around some points; never enlarged.
 
-        Never enlarged. Raises ValueError where the points miss the image.
+        Args:
+            camera: of the image.
+            points_px: (..., 2) to be inside.
+            margin: added on each side, as a share of the points' extent.
+            most_px: longest side of the resized crop.
+
+        Raises:
+            ValueError: the points lie outside the image.
         """
         points = points_px.reshape(-1, 2)
         points = points[np.isfinite(points).all(axis=1)]
@@ -51,7 +58,7 @@ class Crop:
         return cls(part.resized(scale), (int(low[0]), int(low[1])), (width, height))
 
     def image(self, linear: np.ndarray) -> np.ndarray:
-        """The crop of a linear image (h, w, 3) as display values 0 to 255, (h', w', 3) float32."""
+        """The crop (h', w', 3) float32 of `linear` (h, w, 3), as display values 0 to 255."""
         (x, y), (width, height) = self.corner_px, self.size_px
         part = linear_to_srgb(linear[y : y + height, x : x + width]) * np.float32(255)
         size = (self.camera.width_px, self.camera.height_px)

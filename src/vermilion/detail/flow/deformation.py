@@ -18,10 +18,10 @@ class DeformationSettings:
     """How far the mesh follows the flow.
 
     Attributes:
-        mu: trust in the flow against the mesh's shape (Mono13 eq. 14).
-        spacing_px: one vertex is chosen for C in each square of this side; 0: all visible ones.
-        pose: whether the head is first moved as a whole, as the flow of the rigid face asks.
-        depth_sigma_mm: typical error of the head's distance, for that.
+        mu: weight of the flow against the mesh's shape (Mono13 eq. 14).
+        spacing_px: side of the squares in each of which one vertex follows the flow; 0: all do.
+        pose: whether the flow of the rigid face first moves the head as a whole.
+        depth_sigma_mm: typical error of the head's distance, for `pose`.
     """
 
     mu: float = 0.5
@@ -30,7 +30,7 @@ class DeformationSettings:
     depth_sigma_mm: float = 3.0
 
 
-def corrected_mesh(
+def deform_to_flow(
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
     camera: Camera,
@@ -42,22 +42,26 @@ def corrected_mesh(
 ) -> np.ndarray:
     """Follow the flow where it is known, keep the shape elsewhere (Mono13 eq. 14).
 
-    Minimises |L X - L X_b|^2 + mu^2 sum_C |X_i - (X_b,i + W_i)|^2 over the positions X, L the
-    cotangent Laplacian of X_b. W is parallel to the image, so that depth stays as it is; X_b is the
-    mesh after the rigid motion, where that is asked for.
+    Minimises |L X - L X_b|^2 + mu^2 sum_C |X_i - (X_b,i + W_i)|^2 over the positions X. L is the
+    cotangent Laplacian of X_b. W is parallel to the image, so depth does not change. X_b is the mesh
+    after the rigid motion (`settings.pose`).
 
     Args:
-        vertices_mm: (V, 3) in the world.
-        flow_px: (h, w, 2) corrective flow in `camera`'s pixels; mask: (h, w) bool, where it is known.
-        visible: (V,) bool, vertices that may follow it.
+        vertices_mm: (V, 3), world.
+        triangles: (T, 3).
+        camera: of the flow.
+        flow_px: (h, w, 2) corrective flow.
+        mask: (h, w) bool, where the flow is known.
+        visible: (V,) bool, vertices that may follow the flow.
         rigid: (V,) bool, the part of the face that moves with the skull.
+        settings: how far the mesh follows the flow.
 
     Returns:
-        (V, 3) in the world; the input where no vertex is chosen.
+        (V, 3) mm, world; the input where no vertex is chosen.
     """
     pixels = np.nan_to_num(camera.project(vertices_mm), nan=-1e6)
     known = sample_bilinear(mask.astype(np.float32), pixels, "zero") > 0.99
-    chosen = spread(pixels, np.flatnonzero(visible & known), settings.spacing_px)
+    chosen = one_per_cell(pixels, np.flatnonzero(visible & known), settings.spacing_px)
     local = camera.to_camera(np.asarray(vertices_mm, dtype=np.float64))
     if not len(chosen):
         return np.array(vertices_mm, dtype=np.float64)
@@ -76,14 +80,20 @@ def corrected_mesh(
     trust, right = np.zeros(len(local)), np.zeros((len(local), 2))
     trust[chosen] = settings.mu**2
     right[chosen] = settings.mu**2 * wanted
-    # Vertices of no triangle have no Laplacian: a trace of inertia keeps them, and the system, firm.
+    # Vertices of no triangle have no Laplacian: a small diagonal keeps the system regular.
     system = laplacian.T @ laplacian + sparse.diags(trust + 1e-9)
     local[:, :2] += CholeskyFactor(system).solve(right)
     return (local - camera.translation) @ camera.rotation
 
 
-def spread(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
-    """Of the candidates (ids into (V, 2) pixels), in each square of the image the most central."""
+def one_per_cell(pixels: np.ndarray, candidates: np.ndarray, spacing_px: float) -> np.ndarray:
+    """The most central candidate in each square of the image, sorted ids (C,).
+
+    Args:
+        pixels: (V, 2) of all vertices.
+        candidates: (N,) int ids of vertices.
+        spacing_px: side of a square; 0 keeps all candidates.
+    """
     if spacing_px <= 0 or not len(candidates):
         return candidates
     cell = np.floor(pixels[candidates] / spacing_px)

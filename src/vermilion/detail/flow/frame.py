@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.detail.flow.crop import Crop
-from vermilion.detail.flow.deformation import DeformationSettings, corrected_mesh
+from vermilion.detail.flow.crop import FaceCrop
+from vermilion.detail.flow.deformation import DeformationSettings, deform_to_flow
 from vermilion.detail.flow.six_frame_flow import FlowSettings, SixFrames, corrective_flow
 from vermilion.detail.flow.synthetic import (
     FirstFrame,
+    masked_residual,
     motion_px,
-    photometric_residual,
     synthesise,
 )
 from vermilion.faces.model import FaceModel
@@ -23,28 +23,28 @@ _MARGIN = 0.06
 
 
 @dataclass(frozen=True)
-class CorrectionSettings:
+class FlowCorrectionSettings:
     """How a frame is corrected.
 
     Attributes:
-        face_px: the face is never larger than this while flow is computed.
+        face_px: longest side of the face where the flow is computed.
         flow: weights of the flow.
-        deformation: how far the mesh follows it.
+        deformation: how far the mesh follows the flow.
     """
 
-    face_px: int = 480
-    flow: FlowSettings = field(default_factory=FlowSettings)
-    deformation: DeformationSettings = field(default_factory=DeformationSettings)
+    face_px: int
+    flow: FlowSettings
+    deformation: DeformationSettings
 
 
 @dataclass(frozen=True)
 class CorrectedFrame:
-    """What became of a frame.
+    """A corrected mesh and figures.
 
     Attributes:
-        vertices_mm: (V, 3) in the world.
-        before, after: mean absolute photometric residual over the face, display values 0 to 255, over
-            the pixels that both meshes texture.
+        vertices_mm: (V, 3), world.
+        before, after: mean absolute photometric residual of the two meshes, display values 0 to 255,
+            over the pixels of the face that both texture.
         flow_px: median length of the corrective flow over the face, pixels of the whole image.
     """
 
@@ -54,14 +54,14 @@ class CorrectedFrame:
     flow_px: float
 
 
-def compared_triangles(model: FaceModel) -> np.ndarray:
-    """(T,) bool: the skin of the face; the inside of the mouth shows what no texture knows."""
+def skin_triangles(model: FaceModel) -> np.ndarray:
+    """(T,) bool: the skin of the face; the inside of the mouth is not in the first frame's texture."""
     skin = model.regions["face"] & ~model.regions["mouth_inner"]
     return skin[model.triangles].all(axis=1)
 
 
 class FlowCorrection:
-    """A take's first frame and settings; `correct` does one frame, whatever its neighbours."""
+    """Corrects the frames of a take, one at a time, with the texture of its first frame."""
 
     def __init__(
         self,
@@ -69,24 +69,24 @@ class FlowCorrection:
         camera: Camera,
         first_image: np.ndarray,
         first_mm: np.ndarray,
-        settings: CorrectionSettings,
+        settings: FlowCorrectionSettings,
     ):
-        """`first_image` (h, w, 3) linear and `first_mm` (V, 3) are of the frame that textures."""
+        """`first_image` (h, w, 3) linear and `first_mm` (V, 3) world are of the textured frame."""
         self.triangles, self.camera, self.settings = model.triangles, camera, settings
         self.face_vertices = model.regions["face"]
         self.rigid = model.regions["rigid"]
-        self.face = compared_triangles(model)
+        self.face = skin_triangles(model)
         crop = self._crop(first_mm[None])
         image = crop.image(first_image)
         self.first = FirstFrame(image, crop.camera, first_mm, self.triangles)
 
     def correct(self, images: list[np.ndarray], meshes_mm: np.ndarray) -> CorrectedFrame:
-        """Correct the middle mesh.
+        """Correct the mesh of frame t.
 
         Args:
-            images: three linear images (h, w, 3): of t, t + 1, t - 1; at an end of the take, t
-                stands in for what is missing.
-            meshes_mm: (3, V, 3) world, in the same order.
+            images: three linear images (h, w, 3), of t, t + 1, t - 1; at an end of the take, t
+                replaces the missing frame.
+            meshes_mm: (3, V, 3), world, in the same order.
         """
         meshes = np.asarray(meshes_mm, dtype=np.float64)
         crop = self._crop(meshes)
@@ -99,7 +99,7 @@ class FlowCorrection:
         )
         flow = corrective_flow(frames, self.settings.flow)
         visible = RayCaster(meshes[0], self.triangles).visible(crop.camera, meshes[0])
-        mesh = corrected_mesh(
+        mesh = deform_to_flow(
             meshes[0], self.triangles, crop.camera, flow, synthetic[0].mask,
             visible & self.face_vertices, self.rigid, self.settings.deformation,
         )  # fmt: skip
@@ -109,14 +109,14 @@ class FlowCorrection:
         length = np.linalg.norm(flow, axis=2)[synthetic[0].mask] * enlarged
         return CorrectedFrame(
             mesh,
-            photometric_residual(synthetic[0], true[0], both),
-            photometric_residual(after, true[0], both),
+            masked_residual(synthetic[0], true[0], both),
+            masked_residual(after, true[0], both),
             float(np.median(length)) if len(length) else float("nan"),
         )
 
-    def _crop(self, meshes_mm: np.ndarray) -> Crop:
+    def _crop(self, meshes_mm: np.ndarray) -> FaceCrop:
         points = self.camera.project(meshes_mm[:, self.face_vertices])
-        return Crop.around(self.camera, points, _MARGIN, self.settings.face_px)
+        return FaceCrop.around(self.camera, points, _MARGIN, self.settings.face_px)
 
     def _draw(self, camera: Camera, mesh_mm: np.ndarray, behind: np.ndarray):
         return synthesise(self.first, camera, mesh_mm, self.triangles, self.face, behind)

@@ -1,7 +1,7 @@
-"""Loops of the six-frame flow: data terms assembled, flows relaxed.
+"""Compiled loops of the six-frame flow: assembly of the data terms, relaxation of the flows.
 
 The unknowns of a pixel are five flows, w_1 to w_5 (numbered from 0 here). A point x of the reference
-has a place in each of six images, x plus a sum of flows; a data term joins two images.
+has a place in each of six images: x plus a sum of flows. A data term compares two images.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-#: Images: synthetic and true at t, at t + 1, at t - 1; which flows lead from x to the place in each.
+#: For each image (synthetic and true at t, t + 1, t - 1): the flows whose sum leads from x to it.
 PLACES = np.array(
     [
         [0, 0, 0, 0, 0],
@@ -52,7 +52,7 @@ def assemble(images, masks, flows, places, terms, gradient_weight, epsilon, syst
     Args:
         images: (6, h, w, 18) channels; masks: (6, h, w, 1) float32, 1 where they may be compared.
         flows: (h, w, 5, 2) px.
-        gradient_weight: worth of gradient constancy against that of colours.
+        gradient_weight: weight of gradient constancy against colour constancy.
         system: (h, w, 10, 10), right: (h, w, 10), filled: the increments fulfil system d = right.
     """
     height, width = flows.shape[:2]

@@ -1,7 +1,7 @@
-"""The part of the flow that is motion of the head: the pose that the rigid face asks for.
+"""The rigid part of the flow: motion of the head, estimated on the rigid region of the face.
 
-Mono13 7.2 moves vertices parallel to the image alone, which bends a head that is merely turned. So
-the skull's share is taken out first, and only the rest is given to eq. 14.
+Mono13 7.2 moves vertices only parallel to the image, which bends a head that is rotated. So the rigid
+motion is applied first, and eq. 14 follows the rest of the flow.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ def rigid_motion(
     focal_px: float = 1.0,
     iterations: int = 8,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) that carry points to their new places in the image.
+    """Rotation (3, 3) and translation (3,) mm that carry points to their new places in the image.
 
-    Gauss-Newton with robust weights (Cauchy). Motion in depth is hardly seen, so it has a prior.
+    Gauss-Newton with robust weights (Cauchy). Motion in depth is hardly visible, so it has a prior.
 
     Args:
-        local_mm: (N, 3) in the camera frame.
+        local_mm: (N, 3), camera frame.
         moved_to: (N, 2) new places, x / z and y / z.
         depth_sigma_mm: typical motion in depth.
         sigma_px: noise of a place, in pixels of a camera of `focal_px`.
+        focal_px: focal length that `sigma_px` refers to.
+        iterations: Gauss-Newton steps.
 
     Returns:
-        p -> p @ rotation.T + translation in the camera frame; nothing moves if N < 12.
+        p -> p @ rotation.T + translation in the camera frame; the identity if N < 12.
     """
     rotation, translation = np.eye(3), np.zeros(3)
     if len(local_mm) < _LEAST_POINTS:
@@ -41,7 +43,7 @@ def rigid_motion(
     centre = local_mm.mean(axis=0)
     arms = local_mm - centre
     sigma = sigma_px / focal_px
-    # Neighbouring flows err alike: the points together are worth some tens of independent ones.
+    # Errors of neighbouring flows are correlated: all points count as 50 independent ones.
     share = min(1.0, 50.0 / len(arms))
     for _ in range(iterations):
         turned = arms @ rotation.T

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vermilion.detail.flow import kernels
-from vermilion.detail.flow.channels import channels, structure
+from vermilion.detail.flow.channels import channels, structure_direction
 
 _LEAST_SIDE_PX = 24
 
@@ -20,10 +20,12 @@ class FlowSettings:
     Attributes:
         smoothness: alpha_1 to alpha_5.
         similarity: gamma, of w_3 and of w_5.
-        gradient_weight: worth of gradient constancy against that of colours.
-        structure_px: lambda_s, slopes of the flow above which smoothness gives way.
+        gradient_weight: weight of gradient constancy against colour constancy.
+        structure_px: lambda_s, slope of the flow above which the smoothness weight falls.
         data_floor: epsilon of the data penaliser, display values.
-        warps: linearisations a level; sweeps: of relaxation, each; omega: over-relaxation.
+        warps: linearisations a level.
+        sweeps: of relaxation, a linearisation.
+        omega: over-relaxation factor.
     """
 
     smoothness: tuple[float, float, float, float, float] = (250.0, 300.0, 150.0, 300.0, 150.0)
@@ -38,12 +40,12 @@ class FlowSettings:
 
 @dataclass(frozen=True)
 class SixFrames:
-    """Images about a frame t.
+    """Synthetic and true images of t, t + 1 and t - 1.
 
     Attributes:
         images: (6, h, w, 3) float32 display values: synthetic and true at t, t + 1, t - 1.
-        masks: (3, h, w) bool, textured face of the synthetic ones.
-        motion: (2, h, w, 2) px, motion of the synthetic points to t + 1 and t - 1, to start from.
+        masks: (3, h, w) bool, textured face of the synthetic images.
+        motion: (2, h, w, 2) px, motion of the mesh's points to t + 1 and t - 1: the first guess.
     """
 
     images: np.ndarray
@@ -54,8 +56,8 @@ class SixFrames:
 def corrective_flow(frames: SixFrames, settings: FlowSettings) -> np.ndarray:
     """w_1, the flow from the synthetic to the true frame t, (h, w, 2) px float32.
 
-    All five flows are found together, coarse to fine; w_2 and w_4 start from the mesh's motion, the
-    others from nothing.
+    All five flows are solved together, coarse to fine. w_2 and w_4 start from the mesh's motion, the
+    others from zero.
     """
     height, width = frames.images.shape[1:3]
     flows = np.zeros((height, width, 5, 2), dtype=np.float32)
@@ -66,7 +68,8 @@ def corrective_flow(frames: SixFrames, settings: FlowSettings) -> np.ndarray:
     flows = _resized_flow(flows, sizes[-1])
     for size in reversed(sizes):
         flows = _resized_flow(flows, size)
-        _solve_level(*_at_size(frames.images, masks, size), flows, settings)
+        images, inner = _at_size(frames.images, masks, size)
+        _solve_level(images, inner, flows, settings)
     return np.ascontiguousarray(flows[:, :, 0])
 
 
@@ -83,7 +86,7 @@ def _at_size(images, masks, size):
         shape = (size[1], size[0])
         images = np.stack([cv2.resize(p, shape, interpolation=cv2.INTER_AREA) for p in images])
         masks = np.stack([cv2.resize(m, shape, interpolation=cv2.INTER_AREA) for m in masks])
-    # Derivatives at the rim of the texture mix in what lies behind.
+    # Derivatives at the border of the texture contain the background.
     inner = [cv2.erode((m > 0.9).astype(np.float32), np.ones((3, 3)), borderValue=1) for m in masks]
     return images, np.stack(inner)[..., None]
 
@@ -92,7 +95,7 @@ def _solve_level(images, masks, flows, settings):
     """Improve (h, w, 5, 2) flows in place."""
     height, width = flows.shape[:2]
     maps = np.stack([channels(image) for image in images])
-    direction = structure(images[0])
+    direction = structure_direction(images[0])
     alpha = np.asarray(settings.smoothness, dtype=np.float32)
     similarity = np.array([0, 0, settings.similarity, 0, settings.similarity], dtype=np.float32)
     system = np.empty((height, width, 10, 10), dtype=np.float32)

@@ -1,7 +1,7 @@
-"""Synthetic frames: the mesh, textured once and for all from the first frame (Mono13 7.1).
+"""Synthetic frames: the mesh with the texture of the first frame (Mono13 7.1).
 
-The texture has no map: the point of the mesh that a pixel shows is followed to the first frame and
-its colour is read there, so that no resolution is lost.
+There is no texture map: the point of the mesh that a pixel shows is projected into the first frame
+and its colour is sampled there, so no resolution is lost.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _LEAST_FACING = 0.2
 
 
 class FirstFrame:
-    """The image that textures the mesh, and the mesh as it was then."""
+    """The first frame: the image that textures the mesh, and its mesh."""
 
     def __init__(
         self, image: np.ndarray, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray
     ):
-        """`image` (h, w, 3) float32 is `camera`'s, `vertices_mm` (V, 3) in the world."""
+        """`image` (h, w, 3) float32 of `camera`, mesh `vertices_mm` (V, 3) world, `triangles` (T, 3)."""
         self.image, self.camera = image, camera
         self.vertices_mm = np.asarray(vertices_mm, dtype=np.float64)
         caster = RayCaster(self.vertices_mm, triangles)
@@ -36,10 +36,13 @@ class FirstFrame:
         self._seen = (seen & (facing > _LEAST_FACING)).astype(np.float32)
 
     def colours(self, hits: Hits, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Colours (h, w, 3) of what pixels show, and whether the first frame shows it, (h, w)."""
+        """Colours (h, w, 3) of the points at pixels; whether the first frame shows them, (h, w) bool.
+
+        `triangles` (T, 3) are the mesh's.
+        """
         pixels = self.camera.project(interpolate(hits, triangles, self.vertices_mm))
         places = np.where(hits.hit[..., None], np.nan_to_num(pixels), 0).astype(np.float32) - 0.5
-        colours = cv2.remap(
+        colours = cv2.remap(  # type: ignore[call-overload]  # the second map may be None
             self.image, places, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
         )
         return colours, hits.hit & (interpolate(hits, triangles, self._seen) > 0.99)
@@ -47,12 +50,12 @@ class FirstFrame:
 
 @dataclass(frozen=True)
 class SyntheticFrame:
-    """What the camera would see if the mesh were right.
+    """The textured mesh in the camera: equal to the true image if the mesh is right.
 
     Attributes:
         image: (h, w, 3) float32 display values; the true image where there is no texture.
         mask: (h, w) bool, textured face.
-        hits: what the pixels show.
+        hits: points of the mesh at the pixels.
     """
 
     image: np.ndarray
@@ -71,9 +74,12 @@ def synthesise(
     """Draw the textured mesh.
 
     Args:
-        vertices_mm: (V, 3) in the world.
+        first: the texture.
+        camera: of the frame.
+        vertices_mm: (V, 3), world.
+        triangles: (T, 3).
         face: (T,) bool, triangles that may be compared with the image.
-        behind: (h, w, 3) what is shown where there is no texture.
+        behind: (h, w, 3) background, where there is no texture.
     """
     hits = RayCaster(vertices_mm, triangles).see(camera)
     colours, known = first.colours(hits, triangles)
@@ -85,12 +91,19 @@ def synthesise(
 def motion_px(
     frame: SyntheticFrame, camera: Camera, vertices_mm: np.ndarray, triangles: np.ndarray
 ) -> np.ndarray:
-    """How the points that pixels show move to other vertices (V, 3), (h, w, 2) px; 0 off the mesh."""
+    """Motion (h, w, 2) px of the points at pixels to another mesh; 0 off the mesh.
+
+    Args:
+        frame: the points.
+        camera: of the frame.
+        vertices_mm: (V, 3) of the other mesh, world.
+        triangles: (T, 3).
+    """
     there = camera.project(interpolate(frame.hits, triangles, np.asarray(vertices_mm, np.float64)))
     motion = there - camera.pixel_grid()
     return np.where(frame.hits.hit[..., None], np.nan_to_num(motion), 0).astype(np.float32)
 
 
-def photometric_residual(frame: SyntheticFrame, image: np.ndarray, mask: np.ndarray) -> float:
-    """Mean absolute difference to the image over a mask, display values 0 to 255; NaN if empty."""
+def masked_residual(frame: SyntheticFrame, image: np.ndarray, mask: np.ndarray) -> float:
+    """Mean absolute difference to `image` (h, w, 3) over `mask` (h, w) bool; NaN if it is empty."""
     return float(np.abs(frame.image - image)[mask].mean()) if mask.any() else float("nan")

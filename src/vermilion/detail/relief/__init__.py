@@ -1,1 +1,1 @@
-"""Fine relief of the skin from its shading (Mono13 section 8)."""
+"""Fine relief of the skin from shading (Mono13 section 8)."""

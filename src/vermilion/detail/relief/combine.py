@@ -1,4 +1,4 @@
-"""Positions and normals brought together by linear least squares (Nehab et al. 2005)."""
+"""Positions and normals combined by linear least squares (Nehab et al. 2005)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from scipy import sparse
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.sparse import CholeskyFactor
 
-_FIRM = 100.0
+_BORDER_WEIGHT = 100.0
 
 
-def combine(
+def combine_positions_and_normals(
     skin_mm: np.ndarray,
     smooth: np.ndarray,
     wanted: np.ndarray,
@@ -19,12 +19,20 @@ def combine(
     position_weight: float,
     along_mm: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """Displacements (S,) mm along the normals `smooth` (S, 3) that give the skin the normals `wanted`.
+    """Displacements (S,) mm along the smooth normals that give the skin the wanted normals.
 
-    Nehab et al. 2005, eq. 7: edges at right angles to the normals, positions near the found ones
-    `along_mm` (S,) by `position_weight` (1 / mm). Here positions move along the normal only; and as
-    chords of a curved surface are not at right angles to its normals, an edge keeps the angle that it
-    has in the smooth mesh: unchanged normals change nothing. The skin's border stays.
+    Nehab et al. 2005, eq. 7: edges perpendicular to the normals, positions near given ones. Here
+    positions move only along the smooth normal. Chords of a curved surface are not perpendicular to
+    its normals, so an edge keeps the angle that it has in the smooth mesh: unchanged normals give no
+    displacement. The skin's border does not move.
+
+    Args:
+        skin_mm: (S, 3) smooth skin.
+        smooth: (S, 3) its unit normals.
+        wanted: (S, 3) unit normals of the result.
+        topology: of the skin.
+        position_weight: of the given positions, 1 / mm.
+        along_mm: (S,) displacements of the given positions.
     """
     n = len(skin_mm)
     i, j = topology.edges.T
@@ -42,7 +50,7 @@ def combine(
         ),
         shape=(len(i), n),
     )
-    stay = np.where(topology.border, _FIRM, position_weight) ** 2
+    stay = np.where(topology.border, _BORDER_WEIGHT, position_weight) ** 2
     system = slopes.T @ slopes + sparse.diags(stay)
     near = np.where(topology.border, 0.0, along_mm)
     return CholeskyFactor(system).solve(slopes.T @ right + stay * near)

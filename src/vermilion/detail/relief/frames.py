@@ -1,22 +1,23 @@
-"""Relief of the frames of a chunk, and the meshes that follow from it and its neighbours' relief."""
+"""Relief of the frames of a chunk, and their meshes with normals averaged over neighbours."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from vermilion.detail.relief.combine import combine
+from vermilion.detail.relief.combine import combine_positions_and_normals
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.relief import ReliefSettings, solve_relief
-from vermilion.detail.relief.sight import FaceImage, Sight
-from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
+from vermilion.detail.relief.skin_observation import FaceImage, SkinObservation
+from vermilion.detail.relief.tilts import average_tilts, tangents, tilted_normals, tilts_of
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import incidence, triangle_normals, vertex_normals
-from vermilion.imaging.frames import open_frames
+from vermilion.imaging.frames import FrameSource
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
@@ -24,15 +25,23 @@ from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake
 
 
+class ReliefFiles(Protocol):
+    """Input files of a relief job."""
+
+    fit: str
+    meshes: Sequence[str]
+
+
 @dataclass(frozen=True)
-class Scene:
-    """What is needed to look at a frame.
+class ReliefScene:
+    """Images and coarse meshes of a take.
 
     Attributes:
-        topology, camera: of the take.
-        read_image: frame -> linear (h, w, 3), or InputError.
-        read_mesh: frame -> (V, 3) mm in the world, before the refinement.
-        face_px: a larger face is reduced to this.
+        topology: of the fine meshes.
+        camera: of the images.
+        read_image: frame -> image (h, w, 3), linear RGB, or InputError.
+        read_mesh: frame -> coarse mesh (V, 3) mm, world.
+        face_px: longest side of the face in the images that are compared.
     """
 
     topology: FineTopology
@@ -42,32 +51,40 @@ class Scene:
     face_px: int
 
     @classmethod
-    def open(cls, topology, inputs, source, place, span, cfg) -> Scene:
-        """Of a job's files: `fit`, `meshes` (chunks) and what `open_frames` opens.
-
-        Args:
-            place: subject and take; span: first and last frame whose meshes are read.
-        """
-        camera, frames = TrackedTake.load(inputs.fit).camera, open_frames(source, *place)
+    def open(
+        cls,
+        topology: FineTopology,
+        inputs: ReliefFiles,
+        source: FrameSource,
+        span: tuple[int, int],
+        face_px: int,
+    ) -> ReliefScene:
+        """Images of a source, and coarse meshes of the frames from `span[0]` to `span[1]`."""
+        camera = TrackedTake.load(inputs.fit).camera
         places = rows_of_frames(inputs.meshes, range(span[0], span[1] + 1))
 
-        def read_mesh(frame):
+        def read_mesh(frame: int) -> np.ndarray:
             path, row = places[frame]
             return read_sequence(path)[row]
 
-        def read_image(frame):
-            return frames.read(camera.name, frame)
+        def read_image(frame: int) -> np.ndarray:
+            return source.read(camera.name, frame)
 
-        return cls(topology, camera, read_image, read_mesh, cfg["detail.relief.face_px"])
+        return cls(topology, camera, read_image, read_mesh, face_px)
 
     def fine(self, frame: int) -> np.ndarray:
-        """Smooth fine mesh (V', 3)."""
+        """Smooth fine mesh (V', 3) mm of a frame, world."""
         return self.topology.refine(self.read_mesh(frame))
 
-    def sight(self, frame: int, fine_mm: np.ndarray) -> Sight:
-        """Raises InputError without an image, ValueError where the face is not in it."""
+    def observe(self, frame: int, fine_mm: np.ndarray) -> SkinObservation:
+        """Colours of the skin of a fine mesh `fine_mm` (V', 3) in a frame's image.
+
+        Raises:
+            InputError: there is no image.
+            ValueError: the face is not in the image.
+        """
         image, skin = self.read_image(frame), fine_mm[self.topology.skin_ids]
-        return FaceImage.of(image, self.camera, skin, self.face_px).sight(fine_mm, self.topology)
+        return FaceImage.of(image, self.camera, skin, self.face_px).observe(fine_mm, self.topology)
 
 
 @dataclass(frozen=True)
@@ -77,7 +94,7 @@ class ReliefChunk:
     Attributes:
         tilts: (F, S, 3) float32: two tilts of the normal against the smooth mesh, and their trust.
         along_mm: (F, S) float32 displacements along the smooth normals.
-        reasons: (F,) text, empty where the frame has a relief.
+        reasons: (F,) text why a frame has no relief; empty where it has one.
     """
 
     tilts: np.ndarray
@@ -94,10 +111,10 @@ class ReliefChunk:
         return cls(**read_arrays(path, "relief", ["tilts", "along_mm", "reasons"]))
 
 
-def relief_of(
-    scene: Scene, frames: Sequence[int], light: ClipLight, settings: ReliefSettings
+def relief_of_frames(
+    scene: ReliefScene, frames: Sequence[int], light: ClipLight, settings: ReliefSettings
 ) -> ReliefChunk:
-    """Relief of frames one by one; none, without trust, where a frame cannot be seen."""
+    """Relief of frames one by one; zero, with zero trust, where a frame cannot be read."""
     topology = scene.topology
     n = len(topology.skin_ids)
     spread = incidence(topology.skin, n)
@@ -107,50 +124,51 @@ def relief_of(
     for row, frame in enumerate(progress(list(frames), "relief")):
         fine = scene.fine(frame)
         try:
-            sight = scene.sight(frame, fine)
+            observed = scene.observe(frame, fine)
         except (InputError, ValueError) as error:  # no image, or the face is not in it
             reasons[row] = f"no relief: {error}"
             continue
         skin = fine[topology.skin_ids]
-        found = solve_relief(skin, scene.camera.rotation, sight, light, topology, settings)
+        found = solve_relief(skin, scene.camera.rotation, observed, light, topology, settings)
         smooth = vertex_normals(skin, topology.skin)
         shaped = vertex_normals(skin + found[:, None] * smooth, topology.skin)
         along[row] = found
         tilts[row, :, :2] = tilts_of(smooth, tangents(skin, smooth, topology), shaped)
-        tilts[row, :, 2] = (spread @ sight.trust) / count
+        tilts[row, :, 2] = (spread @ observed.trust) / count
     return ReliefChunk(tilts, along, np.array(reasons))
 
 
 class ReliefReader:
-    """Relief of any frame of a take from its chunks, a few of which are kept open."""
+    """Relief of any frame of a take; chunks stay in memory once read."""
 
     def __init__(self, paths: Sequence[str | Path], frames: Sequence[int]):
         """`paths` of chunks `<first>-<last>.npz`; `frames` that may be asked for."""
-        self._places, self._open = rows_of_frames(paths, frames), {}
+        self._places = rows_of_frames(paths, frames)
+        self._open: dict[str | Path, ReliefChunk] = {}
 
-    def _at(self, frame: int):
+    def _at(self, frame: int) -> tuple[ReliefChunk, int]:
         path, row = self._places[frame]
         if path not in self._open:
             self._open[path] = ReliefChunk.load(path)
         return self._open[path], row
 
     def tilts(self, frame: int) -> np.ndarray:
-        """(S, 3) tilts and trust."""
+        """Two tilts and trust (S, 3) of a frame."""
         chunk, row = self._at(frame)
         return chunk.tilts[row]
 
     def along_mm(self, frame: int) -> np.ndarray:
-        """(S,) displacements."""
+        """Displacements (S,) along the smooth normals of a frame."""
         chunk, row = self._at(frame)
         return chunk.along_mm[row]
 
     def reason(self, frame: int) -> str:
-        """Why a frame has no relief of its own, or empty."""
+        """Why a frame has no relief of its own; empty where it has one."""
         chunk, row = self._at(frame)
         return str(chunk.reasons[row])
 
 
-def refined(
+def mesh_with_relief(
     topology: FineTopology,
     fine_mm: np.ndarray,
     reader: ReliefReader,
@@ -159,25 +177,49 @@ def refined(
     window: int,
     position_weight: float,
 ) -> np.ndarray:
-    """Fine mesh (V', 3) with the relief of a frame, its normals averaged over a window of frames."""
+    """Fine mesh (V', 3) mm with the relief of a frame, its normals averaged over time.
+
+    Args:
+        topology: of the fine mesh.
+        fine_mm: (V', 3) smooth fine mesh of the frame.
+        reader: relief of the take.
+        frame: number of the frame.
+        span: first and last frame of the take.
+        window: frames to average over, odd.
+        position_weight: weight of positions against normals, 1 / mm.
+    """
     skin = fine_mm[topology.skin_ids]
     smooth = vertex_normals(skin, topology.skin)
-    tilts = averaged(reader.tilts, frame, span, window)
-    wanted = tilted(smooth, tangents(skin, smooth, topology), tilts)
-    along = combine(skin, smooth, wanted, topology, position_weight, reader.along_mm(frame))
+    tilts = average_tilts(reader.tilts, frame, span, window)
+    wanted = tilted_normals(smooth, tangents(skin, smooth, topology), tilts)
+    along = combine_positions_and_normals(
+        skin, smooth, wanted, topology, position_weight, reader.along_mm(frame)
+    )
     return topology.displaced(fine_mm, smooth, along)
 
 
-def errors_of(
-    topology: FineTopology, light: ClipLight, sight: Sight, fine_mm: np.ndarray, camera: Camera
+def shading_errors(
+    topology: FineTopology,
+    light: ClipLight,
+    observed: SkinObservation,
+    fine_mm: np.ndarray,
+    camera: Camera,
 ) -> np.ndarray:
-    """Absolute difference (Q,) of the image to the shaded mesh, display values; NaN unseen."""
+    """Absolute difference (Q,) of image and shaded mesh, display values; NaN where not seen.
+
+    Args:
+        topology: of the fine mesh.
+        light: of the take.
+        observed: image at the skin's triangles.
+        fine_mm: (V', 3) mesh to compare, world.
+        camera: of the image.
+    """
     normals = triangle_normals(fine_mm[topology.skin_ids], topology.skin) @ camera.rotation.T
-    error = np.abs(sight.colours - light.values(normals)).mean(axis=1)
-    return np.where(sight.trust * (light.seen > 0) > 0, error, np.nan)
+    error = np.abs(observed.colours - light.values(normals)).mean(axis=1)
+    return np.where(observed.trust * (light.seen > 0) > 0, error, np.nan)
 
 
-def residual_of(errors: np.ndarray, trust: np.ndarray) -> float:
-    """Mean of errors (Q,) by trust (Q,) over what is seen; NaN if nothing is."""
+def mean_error(errors: np.ndarray, trust: np.ndarray) -> float:
+    """Mean of `errors` (Q,) weighted by `trust` (Q,) over the seen triangles; NaN if there are none."""
     seen = np.isfinite(errors) & (trust > 0)
     return float(np.average(errors[seen], weights=trust[seen])) if seen.any() else float("nan")

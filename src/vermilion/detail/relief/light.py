@@ -1,4 +1,4 @@
-"""One light and one albedo for a clip, from its first frames (Mono13 section 8)."""
+"""One light and one albedo for a take, from its first frames (Mono13 section 8)."""
 
 from __future__ import annotations
 
@@ -8,31 +8,31 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.appearance.estimate import Sightings, estimate_appearance
+from vermilion.appearance.estimate import SampleObservations, estimate_appearance
 from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
-from vermilion.detail.relief.short_range import DetailFilter
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.high_pass import HighPassFilter
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.imaging.images import srgb_to_linear
 from vermilion.storage.arrays import read_arrays, write_arrays
 
-#: Frames' worth of the skin's one colour in the albedo of a place.
+#: Weight of the skin's median colour in the albedo of a triangle, in frames.
 _PRIOR = 0.5
-_NOISE_MM = 3.0  # noise is alike over such a range
+_NOISE_MM = 3.0  # range over which the noise estimate is smoothed
 
 
 @dataclass(frozen=True)
 class ClipLight:
-    """Light and albedo that hold for all frames.
+    """Light and albedo of all frames of a take.
 
     Attributes:
-        light: (9, 3) harmonics in the camera frame, linear.
-        albedo: (Q, 3) linear, of the skin's triangles.
-        frames: (M,) int that they were learnt from.
+        light: (9, 3) harmonics in the camera frame, linear RGB.
+        albedo: (Q, 3) linear RGB of the skin's triangles.
         seen: (Q,) sum of the first frames' trust.
-        noise: (Q,) deviation of a value from frame to frame, display values.
+        noise: (Q,) deviation of a triangle's value between frames, display values.
+        frames: (M,) int numbers of the frames that they were estimated from.
     """
 
     light: np.ndarray
@@ -42,11 +42,11 @@ class ClipLight:
     frames: np.ndarray
 
     def values(self, normals: np.ndarray) -> np.ndarray:
-        """Predicted display values (Q, 3) of unit normals (Q, 3), camera frame."""
+        """Predicted display values (Q, 3) of triangles with unit `normals` (Q, 3), camera frame."""
         return to_display_values(self.albedo * irradiance(normals, self.light))
 
     def slopes(self, normals: np.ndarray) -> np.ndarray:
-        """Derivative (Q, 3) of the mean display value of a triangle by its normal."""
+        """Derivative (Q, 3) of a triangle's mean display value by its normal, at `normals` (Q, 3)."""
         linear = self.albedo * irradiance(normals, self.light)
         by_normal = np.einsum("qhk,hc->qck", harmonics_jacobian(normals), self.light)
         return np.einsum("qc,qck->qk", display_slope(linear) * self.albedo, by_normal) / 3
@@ -64,34 +64,40 @@ class ClipLight:
 
 def estimate_light(
     frames: Sequence[int],
-    sights: Sequence[Sight],
+    observations: Sequence[SkinObservation],
     topology: FineTopology,
     centres_mm: np.ndarray,
     detail_mm: float,
 ) -> ClipLight:
-    """Light, albedo and noise from sights of a few frames.
+    """Light, albedo and noise from observations of a few frames.
 
-    The albedo is each triangle's own: what stays the same in all of these frames is paint, what
-    changes is shading. A single frame has no noise.
+    Each triangle has its own albedo: the part of its colour that is constant over the frames. The
+    rest is shading and noise. A single frame gives zero noise.
 
     Args:
-        frames: numbers of the frames of `sights`.
+        frames: numbers of the frames of `observations`.
+        observations: image at the skin's triangles in each frame.
+        topology: of the skin.
         centres_mm: (Q, 3) of the triangles in one of the frames.
-        detail_mm: of the noise counts only what changes over shorter ranges.
+        detail_mm: noise that changes over longer ranges is left out.
     """
-    seen = Sightings(
-        np.stack([srgb_to_linear(s.colours / 255) for s in sights])[:, None].astype(np.float64),
-        np.stack([s.normals for s in sights]),
-        np.stack([s.trust for s in sights]),
+    seen = SampleObservations(
+        np.stack([srgb_to_linear(s.colours / 255) for s in observations])[:, None].astype(
+            np.float64
+        ),
+        np.stack([s.normals for s in observations]),
+        np.stack([s.trust for s in observations]),
     )
     n = len(topology.skin)
     middle = SurfacePoints(np.arange(n, dtype=np.int32), np.full((n, 3), 1 / 3))
     found = estimate_appearance(np.asarray(frames), middle, seen, _PRIOR)
     light = ClipLight(found.light, found.albedo[0], found.seen, np.zeros(n), found.frames)
-    detail = DetailFilter(topology.pairs, centres_mm, found.seen, detail_mm)
-    left = np.stack([detail((s.colours - light.values(s.normals)).mean(axis=1)) for s in sights])
+    detail = HighPassFilter(topology.pairs, centres_mm, found.seen, detail_mm)
+    left = np.stack(
+        [detail((s.colours - light.values(s.normals)).mean(axis=1)) for s in observations]
+    )
     squared = (seen.trust * left**2).sum(axis=0) / np.maximum(found.seen, 1e-9)
-    # A triangle's mean has taken a share of its noise along.
-    share = len(sights) / max(len(sights) - 1, 1)
-    near = DetailFilter(topology.pairs, centres_mm, found.seen, _NOISE_MM).smooth(squared)
+    # The albedo has absorbed a share of the noise (Bessel's correction).
+    share = len(observations) / max(len(observations) - 1, 1)
+    near = HighPassFilter(topology.pairs, centres_mm, found.seen, _NOISE_MM).smooth(squared)
     return replace(light, noise=np.sqrt(share * np.maximum(near, 0)))

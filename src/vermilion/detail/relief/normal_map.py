@@ -1,4 +1,4 @@
-"""Tangent-space normal maps: the refined mesh against the smooth one, in the model's texture space."""
+"""Tangent-space normal maps: the mesh with relief against the smooth one, in texture space."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from vermilion.geometry.raycast import RayCaster, interpolate
 
 
 class NormalMap:
-    """Maps of one take: the places of the pixels on the mesh are found once."""
+    """Draws the maps of a take; the points of the mesh at the map's pixels are found once."""
 
     def __init__(self, topology: FineTopology, uv: np.ndarray, size_px: int):
-        """`uv` (V, 2) of the coarse mesh, v upwards; maps are (size_px, size_px)."""
+        """`uv` (V, 2) is the coarse mesh's, v upwards; maps are (size_px, size_px)."""
         self.uv, self._triangles = topology.finer @ uv.astype(np.float64), topology.triangles
         middle = (np.arange(size_px) + 0.5) / size_px
         u, v = np.meshgrid(middle, 1 - middle)
         rays = np.stack([u, v, np.ones_like(u)], axis=2)
-        # Regions other than skin may lie over it in texture space: only the skin is cast.
+        # Other regions may overlap the skin in texture space: only the skin is cast.
         skin = self._triangles[topology.skin_of]
         flat = np.concatenate([self.uv, np.zeros((len(self.uv), 1))], axis=1)
         caster = RayCaster(flat, skin)
@@ -26,10 +26,13 @@ class NormalMap:
         self._skin = skin
 
     def draw(self, smooth_mm: np.ndarray, refined_mm: np.ndarray) -> np.ndarray:
-        """(size_px, size_px, 3) in [0, 1]: 0.5 + 0.5 n, n in (along u, along v, outwards).
+        """Map (size_px, size_px, 3) in [0, 1]: 0.5 + 0.5 n, n in (along u, along v, outwards).
+
+        Off the skin the map is flat.
 
         Args:
-            smooth_mm, refined_mm: (V', 3) fine meshes. Off the skin the map is flat.
+            smooth_mm: (V', 3) smooth fine mesh.
+            refined_mm: (V', 3) mesh with relief.
         """
         smooth = vertex_normals(smooth_mm, self._triangles)
         shaped = vertex_normals(refined_mm, self._triangles)
@@ -40,7 +43,7 @@ class NormalMap:
         return np.where(self._hits.hit[..., None], 0.5 + 0.5 * found, [0.5, 0.5, 1.0])
 
     def _along_u(self, vertices_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(V', 3) unit tangents in which u grows."""
+        """Unit tangents (V', 3) along increasing u."""
         corners, uv = vertices_mm[self._triangles], self.uv[self._triangles]
         one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]

@@ -1,4 +1,4 @@
-"""Images of the relief: frame, smooth mesh, refined mesh, what is left unexplained."""
+"""Images of the relief: frame, smooth mesh, mesh with relief, remaining error."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import colour_map, draw_mesh, label, to_display
-from vermilion.tracking.overlay import cut_to
+from vermilion.tracking.overlay import crop_to_points
 
 _WORST = 40.0  # display values at the hottest colour
 
@@ -25,7 +25,12 @@ def relief_panels(
     """Four panels (480, 480, 3) uint8 of a frame.
 
     Args:
-        image: (h, w, 3) linear; smooth_mm, refined_mm: (V', 3) in the world.
+        name: of the frame.
+        image: (h, w, 3) linear RGB.
+        camera: of the image.
+        topology: of the fine meshes.
+        smooth_mm: (V', 3) smooth mesh, world.
+        refined_mm: (V', 3) mesh with relief, world.
         errors: (Q,) of the skin's triangles, display values (dark 0, red 40); NaN is grey.
     """
     shown, place = to_display(image), camera.project(refined_mm)
@@ -41,4 +46,4 @@ def relief_panels(
         ("refined", draw_mesh(shown, camera, refined_mm, topology.triangles)),
         ("left over", left),
     ]
-    return [label(cut_to(panel, place), text) for text, panel in panels]
+    return [label(crop_to_points(panel, place), text) for text, panel in panels]

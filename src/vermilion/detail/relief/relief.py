@@ -1,4 +1,4 @@
-"""Relief of one frame: displacements along the normals whose shading explains the image's detail."""
+"""Relief of one frame: displacements along the normals, from the detail of the image's shading."""
 
 from __future__ import annotations
 
@@ -7,30 +7,31 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from vermilion.detail.relief.high_pass import HighPassFilter
 from vermilion.detail.relief.light import ClipLight
-from vermilion.detail.relief.short_range import DetailFilter
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.mesh import triangle_areas, triangle_cross, vertex_areas, vertex_normals
 from vermilion.geometry.sparse import CholeskyFactor
 
 _PATCH_MM2 = 4.0  # patches of this area bend independently of one another
 _SAMPLE_MM2 = 1.0  # smaller triangles are not independent measurements
-_FIRM = 1e4
+_BORDER_WEIGHT = 1e4
 _ROBUST_SIGMAS = 2.5
 
 
 @dataclass(frozen=True)
 class ReliefSettings:
-    """What relief is believed.
+    """Priors of the relief and noise of the image.
 
     Attributes:
-        detail_mm: shading that changes over longer ranges is left to light, albedo and coarse mesh.
+        detail_mm: shading that changes over longer ranges is attributed to light, albedo and the
+            coarse mesh.
         curvature_sigma: typical mean curvature of the displacement, 1 / mm.
         displacement_sigma_mm: typical displacement.
-        noise_floor: least deviation of a value (0 to 255), where the first frames show less.
-        misplaced_mm: typical error of a place on the skin: edges of paint are trusted less.
-        iterations: of Gauss-Newton.
+        noise_floor: least deviation of a value (display values, 0 to 255).
+        misplaced_mm: typical error of a place on the skin: edges of the albedo are trusted less.
+        iterations: Gauss-Newton steps.
     """
 
     detail_mm: float = 8.0
@@ -44,26 +45,34 @@ class ReliefSettings:
 def solve_relief(
     skin_mm: np.ndarray,
     world_to_camera: np.ndarray,
-    sight: Sight,
+    observed: SkinObservation,
     light: ClipLight,
     topology: FineTopology,
     settings: ReliefSettings,
 ) -> np.ndarray:
-    """Displacements (S,) in mm of the skin (S, 3); `world_to_camera` is (3, 3).
+    """Displacements (S,) mm of the skin along its normals.
 
-    Gauss-Newton on what is left of the values once all that changes slowly is taken away (so that
-    shading gradients agree, Mono13 8, without the noise that differences of neighbours amplify),
-    with Cauchy weights, each value by its own deviation; on the mean curvature of the displacements;
-    on their size. The skin's border stays.
+    Gauss-Newton on three terms: the high-pass part of the triangles' values, with Cauchy weights and
+    a deviation for each value; the mean curvature of the displacements; their size. Comparing high-pass
+    values makes shading gradients agree (Mono13 8) without amplifying noise as differences of
+    neighbours do. The skin's border does not move.
+
+    Args:
+        skin_mm: (S, 3) smooth skin, world.
+        world_to_camera: (3, 3) rotation.
+        observed: image at the skin's triangles.
+        light: of the take.
+        topology: of the skin.
+        settings: priors and noise.
     """
     normals = vertex_normals(skin_mm, topology.skin)
-    n, q = len(skin_mm), len(topology.skin)
-    trust = sight.trust * (light.seen > 0)
+    n = len(skin_mm)
+    trust = observed.trust * (light.seen > 0)
     if not trust.any():
         return np.zeros(n)
     centres = skin_mm[topology.skin].mean(axis=1)
-    detail = DetailFilter(topology.pairs, centres, trust, settings.detail_mm)
-    sigma = deviation(light, sight, topology, centres, settings)
+    detail = HighPassFilter(topology.pairs, centres, trust, settings.detail_mm)
+    sigma = value_deviation(light, observed, topology, centres, settings)
     stiff = _regulariser(skin_mm, topology, settings)
     areas = triangle_areas(skin_mm, topology.skin)
     worth = trust * np.minimum(areas / _SAMPLE_MM2, 1.0)
@@ -71,24 +80,14 @@ def solve_relief(
     for _ in range(settings.iterations):
         points = skin_mm + along[:, None] * normals
         cross = triangle_cross(points, topology.skin)
-        length = np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
-        facing = cross / length
-        inner = facing @ world_to_camera.T
-        error = detail((sight.colours - light.values(inner)).mean(axis=1))
+        inner = (cross / _lengths(cross)) @ world_to_camera.T
+        error = detail((observed.colours - light.values(inner)).mean(axis=1))
         if scale is None:
-            # Relief is rare: what is off everywhere is a mesh that lies badly on the image.
+            # Relief is sparse: errors that are large everywhere come from a misaligned mesh.
             scale = max(1.0, 1.48 * float(np.median(np.abs(error / sigma)[trust > 0])))
             sigma = sigma * scale
         slope = light.slopes(inner) @ world_to_camera
-        # The hat function of corner k has the gradient facing x (opposite edge) / (2 area).
-        corners = points[topology.skin]
-        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-        hats = np.cross(facing[:, None], opposite) / length[:, None]
-        lift = np.einsum("qk,qck->qc", facing, normals[topology.skin])
-        change = -np.einsum("qk,qck->qc", slope, hats) * lift
-        jacobian = sparse.csr_matrix(
-            (change.ravel(), (np.repeat(np.arange(q), 3), topology.skin.ravel())), shape=(q, n)
-        )
+        jacobian = _jacobian(points, cross, normals, slope, topology.skin)
         weight = worth / (sigma**2 + (error / _ROBUST_SIGMAS) ** 2)
         weighted = jacobian.T @ sparse.diags(weight)
         right = weighted @ error - stiff @ along
@@ -96,15 +95,48 @@ def solve_relief(
     return along
 
 
-def deviation(
+def _lengths(cross: np.ndarray) -> np.ndarray:
+    """Twice the areas (Q, 1) of triangles with cross products (Q, 3)."""
+    return np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-9)
+
+
+def _jacobian(
+    points: np.ndarray, cross: np.ndarray, normals: np.ndarray, slope: np.ndarray, skin: np.ndarray
+) -> sparse.csr_matrix:
+    """Derivative (Q, S) of the triangles' values by the displacements along the normals.
+
+    `points` and `normals` are (S, 3), `cross` and `slope` (derivative by the normal) are (Q, 3).
+    """
+    length = _lengths(cross)
+    facing = cross / length
+    # The hat function of corner k has the gradient facing x (opposite edge) / (2 area).
+    corners = points[skin]
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    hats = np.cross(facing[:, None], opposite) / length[:, None]
+    lift = np.einsum("qk,qck->qc", facing, normals[skin])
+    change = -np.einsum("qk,qck->qc", slope, hats) * lift
+    rows = np.repeat(np.arange(len(skin)), 3)
+    shape = (len(skin), len(points))
+    return sparse.csr_matrix((change.ravel(), (rows, skin.ravel())), shape=shape)
+
+
+def value_deviation(
     light: ClipLight,
-    sight: Sight,
+    observed: SkinObservation,
     topology: FineTopology,
     centres_mm: np.ndarray,
     settings: ReliefSettings,
 ) -> np.ndarray:
-    """Typical error (Q,) of the triangles' values: the clip's noise, and paint that is misplaced."""
-    shown = light.values(sight.normals).mean(axis=1)
+    """Typical error (Q,) of the triangles' values: image noise, and misplaced edges of the albedo.
+
+    Args:
+        light: of the take.
+        observed: image at the skin's triangles.
+        topology: of the skin.
+        centres_mm: (Q, 3) of the triangles.
+        settings: noise.
+    """
+    shown = light.values(observed.normals).mean(axis=1)
     i, j = topology.pairs.T
     apart = np.maximum(np.linalg.norm(centres_mm[i] - centres_mm[j], axis=1), 0.2)
     steep = ((shown[i] - shown[j]) / apart) ** 2
@@ -115,7 +147,7 @@ def deviation(
 
 
 def _regulariser(skin_mm, topology, settings) -> sparse.csc_matrix:
-    """(S, S): smoothness and size of the displacements, alike for any size of triangles."""
+    """(S, S): smoothness and size of the displacements, independent of the size of triangles."""
     n, edges = len(skin_mm), topology.edges
     squared = ((skin_mm[edges[:, 0]] - skin_mm[edges[:, 1]]) ** 2).sum(axis=1)
     graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
@@ -127,5 +159,8 @@ def _regulariser(skin_mm, topology, settings) -> sparse.csc_matrix:
     bend = sparse.diags(4 / mean_squared) @ (sparse.diags(1 / degree) @ graph - sparse.identity(n))
     patches = vertex_areas(skin_mm, topology.skin) / _PATCH_MM2
     bending = bend.T @ sparse.diags(patches / settings.curvature_sigma**2) @ bend
-    stay = np.where(topology.border, _FIRM, patches + 1e-6) / settings.displacement_sigma_mm**2
+    stay = (
+        np.where(topology.border, _BORDER_WEIGHT, patches + 1e-6)
+        / settings.displacement_sigma_mm**2
+    )
     return (bending + sparse.diags(stay)).tocsc()

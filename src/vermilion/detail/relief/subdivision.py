@@ -1,4 +1,4 @@
-"""Loop subdivision as a matrix, so that every frame of a take gets the same finer topology."""
+"""Loop subdivision as a matrix: every frame of a take gets the same finer topology."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ from scipy import sparse
 def loop_subdivision(
     triangles: np.ndarray, n_vertices: int, levels: int
 ) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """Matrix (V', V) from coarse to fine vertices, and the fine triangles (4^levels T, 3).
+    """Matrix (V', V) from coarse to fine vertices, and the fine triangles (4^levels T, 3) int32.
 
-    Loop 1987 with Warren's weights; border vertices follow the border's cubic spline, vertices of no
-    triangle stay. The first V fine vertices are the coarse ones, moved.
+    Loop 1987 with Warren's weights. Border vertices follow the border's cubic spline; vertices without
+    a triangle do not move. The first V fine vertices are the coarse ones, moved.
+
+    Args:
+        triangles: (T, 3).
+        n_vertices: V.
+        levels: subdivisions.
     """
     total = sparse.identity(n_vertices, format="csr")
     for _ in range(levels):

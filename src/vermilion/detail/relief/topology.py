@@ -1,4 +1,4 @@
-"""The subdivided mesh of a take and the part of it whose shading is read: the skin."""
+"""The subdivided mesh of a take, and its skin: the part whose shading is compared."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _BORDER_RINGS = 3
 
 @dataclass(frozen=True)
 class FineTopology:
-    """Fixed for a take; indices of the skin count its own vertices.
+    """Topology of a take's fine meshes; indices of the skin count its own vertices.
 
     Attributes:
         finer: (V', V) coarse to fine vertices.
         triangles: (T', 3) of the whole fine mesh.
         skin_ids: (S,) fine vertices of the skin.
-        skin: (Q, 3) triangles of the skin, in numbers of `skin_ids`.
-        skin_of: (Q,) the same triangles in `triangles`.
+        skin: (Q, 3) triangles of the skin, indices into `skin_ids`.
+        skin_of: (Q,) rows of the same triangles in `triangles`.
         pairs: (P, 2) triangles of the skin that share an edge.
         edges: (E, 2) edges of the skin.
-        beside: (S,) a fixed neighbour of each vertex, the direction of its first tangent.
-        border: (S,) bool, where the skin ends.
+        beside: (S,) a fixed neighbour of each vertex, in the direction of its first tangent.
+        border: (S,) bool, border of the skin.
     """
 
     finer: sparse.csr_matrix
@@ -43,14 +43,16 @@ class FineTopology:
 
     @classmethod
     def of(cls, model: FaceModel, levels: int) -> FineTopology:
-        """Of a face model: its skin without eyes, mouth and the rim of the mesh."""
+        """Topology of a face model; the skin is without eyes, mouth and the border of the mesh."""
         finer, triangles = loop_subdivision(model.triangles, model.n_vertices, levels)
         keep = finer @ skin(model, _BORDER_RINGS).astype(float) > 0.999
         return cls.of_mask(finer, triangles, keep)
 
     @classmethod
-    def of_mask(cls, finer: sparse.csr_matrix, triangles: np.ndarray, keep: np.ndarray):
-        """With `keep` (V',) bool as the skin."""
+    def of_mask(
+        cls, finer: sparse.csr_matrix, triangles: np.ndarray, keep: np.ndarray
+    ) -> FineTopology:
+        """Topology of fine `triangles` (T', 3) with the vertices `keep` (V',) bool as the skin."""
         ids, own = submesh(triangles, keep)
         edges = unique_edges(own)
         beside = np.zeros(len(ids), dtype=int)
@@ -62,11 +64,13 @@ class FineTopology:
         return cls(finer, triangles, ids, own, skin_of, _pairs(own), edges, beside, border)
 
     def refine(self, coarse_mm: np.ndarray) -> np.ndarray:
-        """Smooth fine mesh (V', 3) of a coarse one (V, 3)."""
+        """Smooth fine mesh (V', 3) of `coarse_mm` (V, 3)."""
         return self.finer @ np.asarray(coarse_mm, dtype=np.float64)
 
-    def displaced(self, fine_mm: np.ndarray, normals: np.ndarray, along_mm: np.ndarray):
-        """Fine mesh (V', 3) whose skin is moved by (S,) along its normals (S, 3)."""
+    def displaced(
+        self, fine_mm: np.ndarray, normals: np.ndarray, along_mm: np.ndarray
+    ) -> np.ndarray:
+        """`fine_mm` (V', 3) with its skin moved by `along_mm` (S,) along `normals` (S, 3)."""
         moved = fine_mm.copy()
         moved[self.skin_ids] += along_mm[:, None] * normals
         return moved

@@ -1,14 +1,14 @@
-"""Who it is, from landmarks and images together: shape, albedo and light (Lips16 3.2).
+"""The person from landmarks and images together: shape, albedo and light (Lips16 3.2).
 
-Minimises, over identity, landmark offsets, unknown focal lengths and the poses and weights of a
-few frames of all takes, the energy of the landmarks (`tracking.identity`) and, with a light and an
-albedo for each take,
+The unknowns are identity, landmark offsets, unknown focal lengths, and the poses and weights of a
+few frames of all takes. The energy is that of the landmarks (`landmark_identity`) and, with a light
+and an albedo for each take,
 
     strength * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
-    + how far the albedo is from the skin's one colour
+    + squared difference of the albedo and the skin's median colour
 
-The albedo of each sample is eliminated: held, it would hold the shape that it was estimated under.
-Light, visibility and the images' resolution are held for a round of steps, then found again.
+The albedo is eliminated (`colour_residuals`). Light, visibility and the images' resolution are fixed
+for a round of Gauss-Newton steps, then estimated again.
 """
 
 from __future__ import annotations
@@ -18,91 +18,44 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.appearance.estimate import (
-    Sightings,
-    estimate_appearance,
-    fit_albedo,
-    middle_colour,
-)
-from vermilion.appearance.harmonics import harmonics_jacobian, irradiance
+from vermilion.appearance.estimate import SampleObservations, estimate_appearance
+from vermilion.appearance.harmonics import harmonics_jacobian
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.appearance.samples import sample_skin
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
-from vermilion.imaging.display import display_slope, to_display_values
+from vermilion.imaging.display import display_slope
+from vermilion.tracking.identity.colour_residuals import (
+    IdentityImageSettings,
+    SampledFrame,
+    colour_residuals,
+)
 from vermilion.tracking.identity.landmark_identity import IdentityFit, IdentityProblem
 from vermilion.tracking.image_fit.frame_fit import visible_trust
-from vermilion.tracking.image_fit.image_levels import Level, levels_of
-from vermilion.tracking.landmark_fit.descent import descend, pressed
+from vermilion.tracking.image_fit.image_levels import PyramidLevel, image_pyramid
 from vermilion.tracking.landmark_fit.expression import N_POSE
+from vermilion.tracking.landmark_fit.gauss_newton import active_bounds, gauss_newton
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
-from vermilion.tracking.landmark_fit.shape import growth, landmark_identities, landmark_neutral
-
-
-@dataclass(frozen=True)
-class IdentityImageSettings:
-    """How much the images count.
-
-    Attributes:
-        spacing_mm: between samples of the skin.
-        pixel_mm: of the images that are compared.
-        sigma: deviation of a colour, display values (0 to 255).
-        robust_sigmas: a sample this many deviations off counts half (Cauchy).
-        strength: how many independent samples a face is worth.
-        albedo_prior: how many frames' worth the skin's one colour counts at each sample.
-        rounds: of `iterations` Gauss-Newton steps each.
-    """
-
-    spacing_mm: float = 5.0
-    pixel_mm: float = 8.0
-    sigma: float = 6.0
-    robust_sigmas: float = 2.0
-    strength: float = 10.0
-    albedo_prior: float = 0.5
-    rounds: int = 3
-    iterations: int = 4
+from vermilion.tracking.landmark_fit.shape import (
+    landmark_identities,
+    landmark_neutral,
+    uniform_scale_share,
+)
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """The person, and what the images show of them before and after.
+    """The person, and the errors of the images before and after.
 
     Attributes:
         person: identity, landmark offsets, focal lengths.
-        sheet: a frame each, of the state from landmarks alone and of the joint one: [(errors
-            (N, 3) in display values, trust (N,), place (N, 2) in pixels from the principal point)].
+        residuals: for each frame, of the state from landmarks alone and of the joint one: (errors
+            (N, 3) in display values, trust (N,), place (N, 2) in pixels from the principal point).
     """
 
     person: IdentityFit
-    sheet: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]]
-
-
-@dataclass(frozen=True)
-class _Look:
-    """What one frame shows at the samples, and from where the model is seen."""
-
-    colours: np.ndarray  # (N, 3) linear
-    slopes: np.ndarray  # (N, 3, 2) a pixel
-    trust: np.ndarray  # (N,)
-    normals: np.ndarray  # (N, 3) camera frame
-    rotation: np.ndarray  # (3, 3) camera from head
-    turned: np.ndarray  # (N, 3) camera frame, before the translation
-    points: np.ndarray  # (N, 3) camera frame
-    image: np.ndarray  # (N, 2)
-
-
-@dataclass(frozen=True)
-class _Colours:
-    """A take's frames as they are and as they are predicted, the albedo being the best."""
-
-    errors: np.ndarray  # (M, N, 3) display values
-    weights: np.ndarray  # (M, N) of the squared errors, without the robust share
-    by_albedo: np.ndarray  # (M, N, 3) derivative of the prediction by the albedo
-    predicted: np.ndarray  # (M, N, 3) linear
-    albedo: np.ndarray  # (N, 3)
-    skin: np.ndarray  # (3,)
-    prior: np.ndarray  # (N, 3) of the squared albedo less skin
+    residuals: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]]
 
 
 def fit_joint_identity(
@@ -112,39 +65,42 @@ def fit_joint_identity(
     cameras: Sequence[Camera],
     settings: IdentityImageSettings,
 ) -> JointFit:
-    """One person from frames of their takes.
+    """Fit one person to frames of their takes.
 
     Args:
+        model: the face model.
         problem: the landmarks of F frames.
-        images: F of (h, w, 3) linear RGB; cameras: theirs.
+        images: F images (h, w, 3), linear RGB.
+        cameras: the camera of each image.
+        settings: weight of the images.
     """
     frames, shared = problem.solve()
-    looks = []
+    residuals = []
     samples = sample_skin(model, settings.spacing_mm)
     for turn in range(settings.rounds):
-        held = _Round(model, problem, samples, images, cameras, settings, frames, shared)
+        joint = _JointProblem(model, problem, samples, images, cameras, settings, frames, shared)
         if turn == 0:
-            looks.append(held.residuals(frames, shared))
-        frames, shared = descend(held, frames, shared, settings.iterations)
-    looks.append(held.residuals(frames, shared))
+            residuals.append(joint.residuals(frames, shared))
+        frames, shared = gauss_newton(joint, frames, shared, settings.iterations)
+    residuals.append(joint.residuals(frames, shared))
     return JointFit(
-        problem.result(frames, shared), [list(pair) for pair in zip(*looks, strict=True)]
+        problem.result(frames, shared), [list(pair) for pair in zip(*residuals, strict=True)]
     )
 
 
-class _Round:
-    """The energy with light, visibility and resolution as one state has them."""
+class _JointProblem:
+    """The energy (a `GaussNewtonProblem`) with light, visibility and resolution of one state."""
 
     def __init__(self, model, problem, samples, images, cameras, settings, frames, shared):
         self.problem, self.samples, self.settings = problem, samples, settings
         self.n_identity = problem.n_identity
         self.centre = shared[: self.n_identity].copy()
         self.takes = [np.flatnonzero(problem.take == take) for take in np.unique(problem.take)]
-        identities = _without_size(model)
+        identities = _scale_free_identities(model)
         neutral = model.neutral_mm + np.tensordot(self.centre, identities, axes=1)
         shapes = np.concatenate([model.expressions_mm, identities.astype(np.float32)])
         self.face = SampledFace.of(model, neutral, samples, shapes)
-        self.levels: list[Level] = []
+        self.levels: list[PyramidLevel] = []
         self.trust = np.zeros((len(frames), len(samples)))
         for index, (row, image) in enumerate(zip(frames, images, strict=True)):
             rotation = rotation_matrix(row[:3]) @ problem.reference
@@ -154,14 +110,14 @@ class _Round:
             shape = neutral + np.tensordot(row[N_POSE:], model.expressions_mm, axes=1)
             mesh = shape @ rotation.T + row[3:6]
             self.trust[index] = visible_trust(model, mesh, points, normals)
-            self.levels += levels_of(image, cameras[index], points, settings.pixel_mm, 1)
+            self.levels += image_pyramid(image, cameras[index], points, settings.pixel_mm, 1)
         self.lights = [self._light(rows, frames, shared) for rows in self.takes]
 
     def _weights(self, row: np.ndarray, shared: np.ndarray) -> np.ndarray:
-        """Of the face's shapes: blend weights (K,), then identity less where the round began (I,)."""
+        """Weights of the face's shapes: blend weights (K,), then the change of identity (I,)."""
         return np.concatenate([row[N_POSE:], shared[: self.n_identity] - self.centre])
 
-    def _look(self, index: int, frames: np.ndarray, shared: np.ndarray) -> _Look:
+    def _sampled(self, index: int, frames: np.ndarray, shared: np.ndarray) -> SampledFrame:
         row, weights = frames[index], self._weights(frames[index], shared)
         rotation = rotation_matrix(row[:3]) @ self.problem.reference
         turned = self.face.points(weights) @ rotation.T
@@ -170,49 +126,35 @@ class _Round:
         colours, slopes, inside = self.levels[index].sample(image)
         normals = self.face.normals(weights) @ rotation.T
         trust = self.trust[index] * inside
-        return _Look(colours, slopes, trust, normals, rotation, turned, points, image)
+        return SampledFrame(colours, slopes, trust, normals, rotation, turned, points, image)
 
-    def _light(self, rows, frames, shared) -> np.ndarray:
-        looks = [self._look(index, frames, shared) for index in rows]
-        seen = Sightings(
-            np.stack([look.colours for look in looks])[:, None],
-            np.stack([look.normals for look in looks]),
-            np.stack([look.trust for look in looks]),
+    def _light(self, rows: np.ndarray, frames: np.ndarray, shared: np.ndarray) -> np.ndarray:
+        sampled = [self._sampled(index, frames, shared) for index in rows]
+        seen = SampleObservations(
+            np.stack([frame.colours for frame in sampled])[:, None],
+            np.stack([frame.normals for frame in sampled]),
+            np.stack([frame.trust for frame in sampled]),
         )
         prior = self.settings.albedo_prior
         return estimate_appearance(rows, self.samples, seen, prior).light
 
-    def _colours(self, looks: list[_Look], light: np.ndarray) -> _Colours:
-        s = self.settings
-        colours = np.stack([look.colours for look in looks])
-        trust = np.stack([look.trust for look in looks])
-        shading = irradiance(np.stack([look.normals for look in looks]), light)
-        skin = middle_colour(colours / shading, trust)
-        albedo = fit_albedo(colours, shading, trust, skin, s.albedo_prior)
-        predicted = albedo * shading
-        errors = to_display_values(colours) - to_display_values(predicted)
-        unit = s.strength / (3 * s.sigma**2) / np.maximum(trust.sum(axis=1, keepdims=True), 1e-9)
-        mean = shading.mean(axis=0)
-        prior = s.albedo_prior * unit.mean() * (display_slope(albedo * mean) * mean) ** 2
-        prior = np.where(trust.any(axis=0)[:, None], prior, 0.0)
-        by_albedo = display_slope(predicted) * shading
-        return _Colours(errors, unit * trust, by_albedo, predicted, albedo, skin, prior)
-
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
-        """The energy; infinite where a landmark is behind the camera."""
+        """Energy of `frames` (F, 6 + K) and `shared` (S,); infinite behind the camera."""
         total = self.problem.cost(frames, shared)
         if not np.isfinite(total):
             return total
         limit = 3 * (self.settings.sigma * self.settings.robust_sigmas) ** 2
         for rows, light in zip(self.takes, self.lights, strict=True):
-            found = self._colours([self._look(i, frames, shared) for i in rows], light)
+            found = colour_residuals(
+                [self._sampled(i, frames, shared) for i in rows], light, self.settings
+            )
             squared = (found.errors**2).sum(axis=2)
             total += 0.5 * limit * (found.weights * np.log1p(squared / limit)).sum()
             total += 0.5 * (found.prior * (found.albedo - found.skin) ** 2).sum()
         return float(total)
 
     def newton_step(self, frames: np.ndarray, shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gauss-Newton step with the weights that press against their bounds held."""
+        """Step of `frames` (F, 6 + K) and of `shared` (S,); weights at active bounds stay."""
         known = self.problem.normal_equations(frames, shared)
         n_frames, size = frames.shape
         first, total = n_frames * size, n_frames * size + len(shared)
@@ -224,35 +166,34 @@ class _Round:
             matrix[first:, own] = known.coupling[index].T
         matrix[first:, first:] = known.system
         gradient[:first], gradient[first:] = known.frame_gradient.ravel(), known.shared_gradient
-        for take, (rows, light) in enumerate(zip(self.takes, self.lights, strict=True)):
-            self._add_images(matrix, gradient, take, rows, light, frames, shared)
-        held = pressed(frames, gradient[:first].reshape(frames.shape))
-        free = np.concatenate([~held.ravel(), np.ones(len(shared), dtype=bool)])
+        for rows, light in zip(self.takes, self.lights, strict=True):
+            self._add_images(matrix, gradient, rows, light, frames, shared)
+        fixed = active_bounds(frames, gradient[:first].reshape(frames.shape))
+        free = np.concatenate([~fixed.ravel(), np.ones(len(shared), dtype=bool)])
         system = matrix[np.ix_(free, free)]
-        system[np.diag_indices_from(system)] *= 1 + 1e-3  # what nothing tells stays put
+        system[np.diag_indices_from(system)] *= 1 + 1e-3  # unknowns without data stay
         step = np.zeros(total)
         step[free] = -np.linalg.solve(system, gradient[free])
         return step[:first].reshape(frames.shape), step[first:]
 
-    def _add_images(self, matrix, gradient, take, rows, light, frames, shared):
-        """Adds the images of a take to the system (P, P) and its gradient (P,)."""
-        looks = [self._look(index, frames, shared) for index in rows]
-        found = self._colours(looks, light)
+    def _add_images(self, matrix, gradient, rows, light, frames, shared):
+        """Add the images of a take to the system (P, P) and its gradient (P,), in place."""
+        sampled = [self._sampled(index, frames, shared) for index in rows]
+        found = colour_residuals(sampled, light, self.settings)
         limit = 3 * (self.settings.sigma * self.settings.robust_sigmas) ** 2
         weights = found.weights / (1 + (found.errors**2).sum(axis=2) / limit)
         size, first = frames.shape[1], frames.size
-        # Columns of the shared unknowns that images tell of: identity, and the take's focal length.
+        # Columns of the shared unknowns that images depend on: identity, the take's focal length.
         focal = first + len(shared) - len(self.problem.guess) + self.problem.take[rows[0]]
         common = np.append(np.arange(first, first + self.n_identity), focal)
         curvature = (weights[..., None] * found.by_albedo**2).sum(axis=0) + found.prior
         root = np.sqrt(np.maximum(curvature, 1e-12)).reshape(-1)
-        # The albedo is at its best: what is left of its gradient is nought but for rounding and
-        # the robust weights.
+        # The albedo is optimal: its gradient is zero except for rounding and the robust weights.
         left = -(found.prior * (found.albedo - found.skin)).reshape(-1)
         through = np.zeros((curvature.size, len(rows) * size + len(common)), dtype=np.float32)
         columns = [np.arange(index * size, (index + 1) * size) for index in rows] + [common]
-        for place, (index, look) in enumerate(zip(rows, looks, strict=True)):
-            jacobian = self._jacobian(index, frames, shared, look, found, place, light)
+        for place, (index, frame) in enumerate(zip(rows, sampled, strict=True)):
+            jacobian = self._jacobian(index, frames, shared, frame, found, place, light)
             error = found.errors[place].reshape(-1)
             weight = np.repeat(weights[place], 3)
             own = np.concatenate([columns[place], common])
@@ -268,39 +209,39 @@ class _Round:
         matrix[np.ix_(every, every)] -= through.T @ through
         gradient[every] -= through.T @ (left / root).astype(np.float32)
 
-    def _jacobian(self, index, frames, shared, look, found, place, light) -> np.ndarray:
-        """Derivative (3 N, 6 + K + I + 1) of a frame's errors by its unknowns, identity and log focal."""
+    def _jacobian(self, index, frames, shared, frame, found, place, light) -> np.ndarray:
+        """Derivative (3 N, 6 + K + I + 1) of a frame's errors: its unknowns, identity, log focal."""
         row, focal = frames[index], self.problem.focal(shared)[index]
         turn = left_jacobian(row[:3])
-        seen = display_slope(look.colours)[..., None] * look.slopes
-        by_point = seen @ projection_jacobian(look.points, focal)
-        by_rotation = by_point @ (-cross_matrix(look.turned) @ turn)
-        by_shape = (by_point @ look.rotation).astype(np.float32) @ self.face.expressions_mm
-        lit = np.tensordot(harmonics_jacobian(look.normals), light, axes=([1], [0]))
+        seen = display_slope(frame.colours)[..., None] * frame.slopes
+        by_point = seen @ projection_jacobian(frame.points, focal)
+        by_rotation = by_point @ (-cross_matrix(frame.turned) @ turn)
+        by_shape = (by_point @ frame.rotation).astype(np.float32) @ self.face.expressions_mm
+        lit = np.tensordot(harmonics_jacobian(frame.normals), light, axes=([1], [0]))
         by_normal = found.albedo * display_slope(found.predicted[place])
         by_normal = by_normal[..., None] * np.swapaxes(lit, 1, 2)
-        by_rotation -= by_normal @ (-cross_matrix(look.normals) @ turn)
+        by_rotation -= by_normal @ (-cross_matrix(frame.normals) @ turn)
         weights = self._weights(row, shared)
-        by_shape -= self.face.through_normals(weights, by_normal @ look.rotation)
-        by_focal = (seen @ look.image[..., None]).astype(np.float32)
+        by_shape -= self.face.through_normals(weights, by_normal @ frame.rotation)
+        by_focal = (seen @ frame.image[..., None]).astype(np.float32)
         parts = [by_rotation, by_point, by_shape, by_focal]
         joined = np.concatenate([part.astype(np.float32) for part in parts], axis=2)
         return joined.reshape(-1, joined.shape[2])
 
     def residuals(self, frames: np.ndarray, shared: np.ndarray) -> list[tuple]:
-        """(errors (N, 3), trust (N,), place (N, 2)) of every frame, as in `JointFit.sheet`."""
-        results = {}
+        """`JointFit.residuals` of every frame at `frames` (F, 6 + K) and `shared` (S,)."""
+        results: dict[int, tuple] = {}
         for rows, light in zip(self.takes, self.lights, strict=True):
-            looks = [self._look(index, frames, shared) for index in rows]
-            errors = self._colours(looks, light).errors
-            for index, look, error in zip(rows, looks, errors, strict=True):
-                results[int(index)] = (error, look.trust, look.image)
+            sampled = [self._sampled(index, frames, shared) for index in rows]
+            errors = colour_residuals(sampled, light, self.settings).errors
+            for index, frame, error in zip(rows, sampled, errors, strict=True):
+                results[int(index)] = (error, frame.trust, frame.image)
         return [results[index] for index in range(len(frames))]
 
 
-def _without_size(model: FaceModel) -> np.ndarray:
-    """Identities (I, V, 3) less what they change of the landmarks' size, as the landmarks' energy."""
+def _scale_free_identities(model: FaceModel) -> np.ndarray:
+    """Identities (I, V, 3) without uniform scale of the landmarks, as in the landmarks' energy."""
     landmarks = landmark_neutral(model)
-    share = growth(landmark_identities(model), landmarks)
+    share = uniform_scale_share(landmark_identities(model), landmarks)
     about = model.neutral_mm - landmarks.mean(axis=0)
     return model.identities_mm - share[:, None, None] * about

@@ -1,7 +1,7 @@
-"""Who it is: identity coefficients from landmarks of frames of all of a subject's takes.
+"""The person from landmarks: identity coefficients over frames of all of a subject's takes.
 
-Identity, landmark offsets, focal lengths (where unknown), poses and weights are found together, by
-Gauss-Newton with the frames eliminated (Schur complement).
+Gauss-Newton finds identity, landmark offsets, unknown focal lengths, poses and weights together.
+The unknowns of the frames are eliminated (Schur complement).
 """
 
 from __future__ import annotations
@@ -12,38 +12,46 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.rotations import log_about_mean, rotation_matrix
-from vermilion.storage.errors import InputError
-from vermilion.tracking.landmark_fit.descent import NormalEquations, descend, pressed
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
+from vermilion.tracking.landmark_fit.gauss_newton import (
+    NormalEquations,
+    active_bounds,
+    gauss_newton,
+)
 from vermilion.tracking.landmark_fit.observation import (
     LandmarkNoise,
     Observations,
     pose_jacobian,
     project,
     projection_jacobian,
+    require_landmarks,
     robust_cost,
     robust_weights,
     whitening,
 )
-from vermilion.tracking.landmark_fit.shape import LandmarkShape, landmark_identities, without_size
+from vermilion.tracking.landmark_fit.shape import (
+    LandmarkShape,
+    landmark_identities,
+    without_uniform_scale,
+)
 from vermilion.tracking.landmark_fit.start import first_guess
 from vermilion.tracking.places import LandmarkPlaces
 
 
 @dataclass(frozen=True)
 class IdentitySettings:
-    """Priors of the person; the same for everybody.
+    """Priors of the person; the same for all people.
 
     Attributes:
-        fit: noise and weights, as in tracking.
-        bias: how far a person's landmarks, as the detector sees them, lie from the model's in
-            every frame alike, as fractions of the inter-ocular distance.
+        fit: noise of the landmarks and prior of the weights, as in the landmark fit.
+        bias: deviation of a person's detected landmarks from the model's that is constant over all
+            frames, as fractions of the inter-ocular distance.
         neutral_weight_sigma: deviation of the weights in a frame known to be neutral.
-        focal_sigma: deviation of the logarithm of an unknown focal length about the guess.
-        iterations: of Gauss-Newton, at most.
+        focal_sigma: deviation of the logarithm of an unknown focal length about its guess.
+        iterations: Gauss-Newton steps, at most.
     """
 
-    fit: FitSettings = field(default_factory=FitSettings)
+    fit: LandmarkFitSettings = field(default_factory=LandmarkFitSettings)
     bias: LandmarkNoise = field(default_factory=lambda: LandmarkNoise(0.08, 0.05, 0.04, 0.04, 0.04))
     neutral_weight_sigma: float = 0.03
     focal_sigma: float = 0.3
@@ -56,9 +64,9 @@ class TakeSample:
 
     Attributes:
         name: the take.
-        seen: its frames; those not valid are left out.
-        focal_px: known, or the guess to start from.
-        calibrated: whether it is known.
+        seen: landmarks of n frames; frames that are not valid are left out.
+        focal_px: focal length, known or first guess.
+        calibrated: whether the focal length is known.
         neutral: (n,) bool, which frames show the neutral.
     """
 
@@ -75,10 +83,10 @@ class IdentityFit:
 
     Attributes:
         identity: (I,) in standard deviations.
-        landmark_offset_mm: (N, 3) in the head frame: where the detector sees the landmarks of
-            the neutral, less where the model has them.
-        focal_px: take -> focal length, of every take.
-        reprojection_px: root mean square over all frames.
+        landmark_offset_mm: (N, 3) in the head frame: the neutral's landmarks as detected, minus
+            the model's.
+        focal_px: take -> focal length.
+        reprojection_px: RMS over all frames and all landmarks except the jaw's.
     """
 
     identity: np.ndarray
@@ -106,22 +114,29 @@ def fit_identity(
 
 
 class IdentityProblem:
-    """Unknowns: frames (F, 6 + K), and shared = identity (I), offsets (3 N), log focal (takes)."""
+    """The landmark energy of one person (a `GaussNewtonProblem`).
 
-    def __init__(self, model, samples, settings, places=None):
+    Unknowns: `frames` (F, 6 + K) are pose and weights of each frame; `shared` (S,) are identity (I),
+    landmark offsets (3 N) and the logarithm of each take's focal length.
+    """
+
+    def __init__(
+        self,
+        model: FaceModel,
+        samples: list[TakeSample],
+        settings: IdentitySettings,
+        places: LandmarkPlaces | None = None,
+    ):
         keep = [np.flatnonzero(sample.seen.valid) for sample in samples]
         counts = [len(k) for k in keep]
-        if sum(counts) == 0:
-            raise InputError(
-                "no frame with landmarks in any take",
-                "a face in at least one frame",
-                "Look at the landmark overlays; check the detector's settings.",
-            )
+        require_landmarks([sample.seen for sample in samples])
         self.samples, self.settings = samples, settings
         self.shape = LandmarkShape.of(model, places=places)
         self.landmark_set = self.shape.landmark_set
         self.n_offset = 3 * self.landmark_set.n_points
-        self.identities = without_size(landmark_identities(model, places), self.shape.neutral_mm)
+        self.identities = without_uniform_scale(
+            landmark_identities(model, places), self.shape.neutral_mm
+        )
         self.n_identity, self.n_weights = len(self.identities), self.shape.n_expressions
         parts = [sample.seen[k] for sample, k in zip(samples, keep, strict=True)]
         self.image = np.concatenate([part.image for part in parts])
@@ -149,7 +164,8 @@ class IdentityProblem:
         bias = self.settings.bias.per_landmark(self.landmark_set)
         return bias * self.shape.interocular_mm
 
-    def first_guess(self):
+    def first_guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frames (F, 6 + K) fitted to the mean face, and shared unknowns (S,) at their priors."""
         valid = np.ones(self.n_frames, dtype=bool)
         seen = Observations(self.image, self.trust, valid, self.landmark_set)
         rotation, translation, weights = first_guess(
@@ -175,7 +191,7 @@ class IdentityProblem:
         return shared[self.n_identity : self.n_identity + self.n_offset].reshape(-1, 3)
 
     def focal(self, shared: np.ndarray) -> np.ndarray:
-        """(F, 1) pixels."""
+        """Focal lengths (F, 1) px of the frames, of `shared` (S,)."""
         return np.exp(shared[self.n_identity + self.n_offset :])[self.take][:, None]
 
     def _residual(self, points: np.ndarray, focal: np.ndarray):
@@ -195,6 +211,7 @@ class IdentityProblem:
         return shared - centre
 
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
+        """Energy of `frames` (F, 6 + K) and `shared` (S,); infinite behind the camera."""
         points = self._camera_points(frames, shared)
         if (points[..., 2] <= 1.0).any():
             return np.inf
@@ -205,7 +222,7 @@ class IdentityProblem:
         return float(total)
 
     def _linearised(self, frames: np.ndarray, shared: np.ndarray):
-        """Weighted residuals (F, 2 N) and Jacobians by frame unknowns and by shared ones."""
+        """Weighted residuals (F, 2 N), Jacobians (F, 2 N, 6 + K) and (F, 2 N, S)."""
         shape = LandmarkShape(self._neutral(shared), self.shape.expressions_mm)
         turned, by_rotation = pose_jacobian(
             frames[:, :3], self.reference, shape.points(frames[:, N_POSE:])
@@ -234,7 +251,7 @@ class IdentityProblem:
         return residual.reshape(size), by_frame.reshape(*size, -1), by_shared.reshape(*size, -1)
 
     def normal_equations(self, frames: np.ndarray, shared: np.ndarray) -> NormalEquations:
-        """Of the energy at a state, no weight held."""
+        """The system at `frames` (F, 6 + K) and `shared` (S,), without bounds on the weights."""
         residual, by_frame, by_shared = self._linearised(frames, shared)
         blocks = np.swapaxes(by_frame, 1, 2) @ by_frame
         diagonal = np.arange(blocks.shape[1])
@@ -250,9 +267,9 @@ class IdentityProblem:
         )
 
     def newton_step(self, frames: np.ndarray, shared: np.ndarray):
-        """Gauss-Newton step with the weights that press against their bounds held."""
+        """Step of `frames` (F, 6 + K) and of `shared` (S,); weights at active bounds stay."""
         found = self.normal_equations(frames, shared)
-        held = pressed(frames, found.frame_gradient)
+        held = active_bounds(frames, found.frame_gradient)
         gradient = np.where(held, 0.0, found.frame_gradient)
         coupling = np.where(held[..., None], 0.0, found.coupling)
         blocks = np.where(held[:, None] | held[..., None], 0.0, found.blocks)
@@ -268,9 +285,11 @@ class IdentityProblem:
 
     def solve(self) -> tuple[np.ndarray, np.ndarray]:
         """Frames (F, 6 + K) and shared unknowns (S,) from landmarks alone."""
-        return descend(self, *self.first_guess(), self.settings.iterations)
+        frames, shared = self.first_guess()
+        return gauss_newton(self, frames, shared, self.settings.iterations)
 
     def result(self, frames: np.ndarray, shared: np.ndarray) -> IdentityFit:
+        """The person of the solution `frames` (F, 6 + K) and `shared` (S,)."""
         image = project(self._camera_points(frames, shared), self.focal(shared))
         squared = ((image - self.image) ** 2).sum(axis=-1)[:, self.landmark_set.compared]
         focal = np.exp(shared[self.n_identity + self.n_offset :])

@@ -1,4 +1,4 @@
-"""Which frames of a subject's takes tell who it is."""
+"""The frames of a subject's takes to which the person is fitted."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from vermilion.tracking.landmark_fit.observation import Observations, focal_px
 
 @dataclass(frozen=True)
 class SampledFrames:
-    """Frames of a take that tell who it is.
+    """Frames of a take to which the person is fitted.
 
     Attributes:
-        sample: their landmarks.
+        sample: landmarks of the frames.
         camera: of the take.
-        frames: (n,) their numbers.
+        frames: (n,) numbers of the frames.
     """
 
     sample: TakeSample
@@ -42,10 +42,10 @@ def sample_takes(
 
     Args:
         takes: of each take its name (`take`), its camera (`camera`), the frame that shows the
-            neutral or None (`neutral`), and how many of `landmarks` are its (`chunks`).
-        landmarks: files of all takes, take by take.
+            neutral or None (`neutral`), and the number of its files in `landmarks` (`chunks`).
+        landmarks: landmark files of all takes, take by take.
         cameras, calibrations: folder of cameras and summary of the calibration, one a take.
-        count: frames of all takes together, about.
+        count: wanted number of frames, over all takes.
     """
     paths: Iterator[str] = iter(landmarks)
     tracks = {
@@ -68,16 +68,13 @@ def sample_takes(
 
 
 def spread_frames(valid: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """Rows of each take, evenly spread over its valid frames, its first frame among them.
+    """Rows (n,) of each take, evenly spaced over its valid frames, the first among them.
 
     Args:
         valid: take -> (F,) bool.
-        count: rows of all takes together, about; every take with a valid frame has at least one.
+        count: wanted number of rows, over all takes; a take with a valid frame has at least one.
     """
     usable = {take: np.flatnonzero(mask) for take, mask in valid.items()}
     usable = {take: rows for take, rows in usable.items() if len(rows)}
     each = max(1, round(count / max(len(usable), 1)))
-    chosen = {}
-    for take, rows in usable.items():
-        chosen[take] = rows[evenly_spaced(len(rows), each)]
-    return chosen
+    return {take: rows[evenly_spaced(len(rows), each)] for take, rows in usable.items()}

@@ -1,4 +1,4 @@
-"""The table of ablations: what each step of the track leaves unexplained."""
+"""The table of ablations: the photometric residual after each step of the track."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pandas as pd
 
 COLUMNS = ["subject", "take", "basis", "step", "residual", "held_out", "frames"]
 
-#: Step -> what it is measured with; all other steps with the track's own light and albedo.
+#: Step -> colours of the mesh in its residual; all other steps use the track's light and albedo.
 BASES = {
     "before_flow": "texture of the first frame",
     "flow": "texture of the first frame",
@@ -16,10 +16,10 @@ BASES = {
 
 
 def ablation_rows(table: pd.DataFrame) -> pd.DataFrame:
-    """A row a take and step, in the order they come: mean residual, display values (0 to 255).
+    """A row a take and step, in order of appearance: mean residual, display values (0 to 255).
 
-    Residuals compare within a basis only: what the mesh is coloured with before it is compared with
-    the image (`BASES`). `held_out` counts only frames that the appearance was not learnt from (NaN where there are none).
+    Residuals are comparable only within a basis: the colours of the mesh (`BASES`). `held_out` is the
+    mean over frames that the appearance was not estimated from; NaN where there are none.
 
     Args:
         table: columns subject, take, step, frame, residual, and learnt_from (0 or 1) where known.

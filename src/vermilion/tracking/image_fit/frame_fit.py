@@ -4,7 +4,7 @@ Minimises, over the rotation, the translation and the weights w in [0, 1],
 
     strength * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + the landmark terms and |w|^2 / weight_sigma^2 of the landmark fit
-    + |x - x_landmarks|^2 over how far a track may be moved
+    + |x - x_landmarks|^2 over the squared typical change from the landmark fit
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.raycast import RayCaster
 from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.imaging.display import display_slope, to_display_values
-from vermilion.tracking.image_fit.image_levels import Level
+from vermilion.tracking.image_fit.image_levels import PyramidLevel
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.expression import N_POSE
@@ -29,16 +29,16 @@ from vermilion.tracking.landmark_fit.observation import project, projection_jaco
 
 
 @dataclass(frozen=True)
-class PhotometricSettings:
-    """How much the image counts.
+class FrameFitSettings:
+    """How much the image counts beside the landmarks.
 
     Attributes:
         sigma: deviation of a colour, display values (0 to 255).
         robust_sigmas: a sample this many deviations off counts half (Cauchy).
-        strength: how many independent samples the whole face is worth.
-        rotation_deg, translation_mm, depth_mm, weight: typical moves from the landmark fit.
+        strength: weight of the whole face's image, in independent samples.
+        rotation_deg, translation_mm, depth_mm, weight: typical change from the landmark fit.
         iterations: Gauss-Newton steps at each resolution, coarsest first.
-        shading: whether the shading's change with the normal counts, or the motion alone.
+        shading: whether the Jacobian has the change of shading with the normal, besides the motion.
     """
 
     sigma: float = 6.0
@@ -53,19 +53,19 @@ class PhotometricSettings:
 
 
 @dataclass(frozen=True)
-class View:
-    """One frame: what the model is compared with.
+class FrameView:
+    """The data of one frame.
 
     Attributes:
-        levels: the image, finest first.
-        focal_px: of the ideal pinhole.
-        trust: (N,) of each sample in this frame, zero where hidden.
+        levels: image pyramid, finest first.
+        focal_px: of the ideal pinhole camera.
+        trust: (N,) in [0, 1] of each sample in this frame; zero where hidden.
         landmarks: the frame's landmark term.
-        start: (6 + K,) the landmark fit.
-        reference: (3, 3) about which the rotation vector turns.
+        start: (6 + K,) the landmark fit: rotation vector, translation, weights.
+        reference: (3, 3) rotation that the rotation vector is relative to.
     """
 
-    levels: list[Level]
+    levels: list[PyramidLevel]
     focal_px: float
     trust: np.ndarray
     landmarks: LandmarkTerm
@@ -75,11 +75,12 @@ class View:
 
 @dataclass(frozen=True)
 class FrameFit:
-    """A frame's solution and the quadratic about it.
+    """A frame's solution and the quadratic model of the energy there, x'Ax/2 - b'x.
 
     Attributes:
-        x: (6 + K,).
-        matrix: (6 + K, 6 + K) and right (6 + K,): energy ~ x'Ax/2 - b'x near the solution.
+        x: (6 + K,) rotation vector, translation, weights.
+        matrix: (6 + K, 6 + K) A.
+        right: (6 + K,) b.
     """
 
     x: np.ndarray
@@ -88,8 +89,8 @@ class FrameFit:
 
 
 @dataclass(frozen=True)
-class _Part:
-    """The samples that one frame shows: face, albedo (L, n, 3), trust (n,)."""
+class _VisibleSamples:
+    """The n samples that one frame shows: face, albedo (L, n, 3), trust (n,)."""
 
     face: SampledFace
     albedo: np.ndarray
@@ -97,13 +98,13 @@ class _Part:
 
 
 class FrameProblem:
-    """The energy above, of one person in one appearance."""
+    """The energy above, of one person with one appearance."""
 
     def __init__(
         self,
         face: SampledFace,
         appearance: Appearance,
-        settings: PhotometricSettings,
+        settings: FrameFitSettings,
         weight_sigma: float,
     ):
         self.face, self.appearance, self.settings = face, appearance, settings
@@ -122,13 +123,13 @@ class FrameProblem:
         self.upper = -self.lower
         self.lower[N_POSE:], self.upper[N_POSE:] = 0.0, 1.0
 
-    def solve(self, view: View) -> FrameFit:
-        """Coarse to fine from the landmark fit."""
+    def solve(self, view: FrameView) -> FrameFit:
+        """The frame's solution, coarse to fine from the landmark fit."""
         x, counts = view.start, self.settings.iterations
         none = np.zeros((0, len(x)))
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
             # Coarse images need fewer samples.
-            part = self._part(view, 2**level)
+            part = self._visible(view, 2**level)
             cost = self._cost(x, view, level, part)
             for _ in range(count):
                 matrix, right = self._normal_equations(x, view, level, part)
@@ -150,12 +151,12 @@ class FrameProblem:
         matrix, right = self._normal_equations(x, view, 0, part)
         return FrameFit(x, matrix, right)
 
-    def _part(self, view: View, every: int) -> _Part:
+    def _visible(self, view: FrameView, every: int) -> _VisibleSamples:
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))[::every]
-        return _Part(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
+        return _VisibleSamples(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
 
     def _errors(self, x, view, level, part):
-        """Image less model in display values (n, 3), what they came from, and trust (n,)."""
+        """Image minus model (n, 3) display values, its intermediate results, and trust (n,)."""
         rotation = rotation_matrix(x[:3]) @ view.reference
         turned = part.face.points(x[N_POSE:]) @ rotation.T
         points = turned + x[3:6]
@@ -177,7 +178,7 @@ class FrameProblem:
         return float(total + 0.5 * (self.stay * (x - view.start) ** 2).sum())
 
     def _normal_equations(self, x, view, level, part):
-        """Matrix A and right b with x'Ax/2 - b'x the energy's quadratic at x."""
+        """A (6 + K, 6 + K) and b (6 + K,) of the energy's quadratic model x'Ax/2 - b'x at x."""
         error, parts, weight = self._errors(x, view, level, part)
         s = self.settings
         robust = 1.0 / (1.0 + (error**2).sum(axis=1) / (3 * s.sigma**2 * s.robust_sigmas**2))
@@ -221,10 +222,14 @@ def visible_trust(
     normals: np.ndarray,
     least_cosine: float = 0.25,
 ) -> np.ndarray:
-    """Trust (N,) of samples: how squarely the camera sees them, zero where hidden or oblique.
+    """Trust (N,) of samples in [0, 1]: 1 seen frontally, 0 hidden or oblique.
 
     Args:
-        vertices_mm: (V, 3); points_mm, normals: (N, 3); all in the camera frame.
+        model: topology of the mesh.
+        vertices_mm: (V, 3) mesh, camera frame.
+        points_mm: (N, 3) samples, camera frame.
+        normals: (N, 3) unit normals of the samples, camera frame.
+        least_cosine: cosine of normal and viewing direction at which trust becomes zero.
     """
     distance = np.linalg.norm(points_mm, axis=1)
     rays = points_mm / distance[:, None]

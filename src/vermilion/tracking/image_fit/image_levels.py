@@ -1,4 +1,4 @@
-"""An image about the face at a few coarse resolutions, sampled between its pixels."""
+"""Image pyramid of the face: a few resolutions, sampled between pixels."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ _MARGIN_MM = 12.0
 
 
 @dataclass(frozen=True)
-class Level:
-    """One resolution.
+class PyramidLevel:
+    """One resolution. Places are pixels of an ideal pinhole camera with the camera's x focal length.
 
     Attributes:
         colours: (h, w, 3) float32 linear RGB.
         slopes_x, slopes_y: (h, w, 3) float32 derivatives, per pixel of the level.
-        origin: (2,) pixels from the principal point (an ideal pinhole of the camera's x focal
-            length) of the upper left corner.
-        step: (2,) of such pixels a pixel of the level.
+        origin: (2,) the upper left corner, from the principal point.
+        step: (2,) width and height of a pixel of the level.
     """
 
     colours: np.ndarray
@@ -34,10 +33,10 @@ class Level:
     step: np.ndarray
 
     def sample(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At points (N, 2), pixels from the principal point.
+        """Colours and derivatives at `places` (N, 2), pixels from the principal point.
 
         Returns:
-            values (N, 3); derivatives (N, 3, 2) per such pixel; inside (N,) bool.
+            values (N, 3); derivatives (N, 3, 2) per pixel of the ideal camera; inside (N,) bool.
         """
         pixels = (places - self.origin) / self.step
         height, width = self.colours.shape[:2]
@@ -51,18 +50,19 @@ class Level:
         return found[0], slopes, inside
 
 
-def levels_of(
+def image_pyramid(
     image: np.ndarray,
     camera: Camera,
     points_mm: np.ndarray,
     pixel_mm: float,
     count: int,
-) -> list[Level]:
-    """The image round points in the camera frame, finest level first.
+) -> list[PyramidLevel]:
+    """The image around some points, finest level first.
 
     Args:
         image: (h, w, 3) linear RGB.
-        points_mm: (N, 3) in the camera frame.
+        camera: of the image.
+        points_mm: (N, 3), camera frame.
         pixel_mm: size of a pixel of the finest level at the points' mean depth; never finer than
             the image itself.
         count: of levels, each half as fine as the one before.
@@ -86,18 +86,18 @@ def levels_of(
                 interpolation=cv2.INTER_AREA,
             )
         soft = cv2.GaussianBlur(small, (0, 0), 0.7)
-        slopes = [cv2.Sobel(soft, cv2.CV_32F, *axis, ksize=3, scale=0.125) for axis in _AXES]
-        levels.append(Level(soft, *slopes, origin, size / shape))
+        slope_x, slope_y = (
+            cv2.Sobel(soft, cv2.CV_32F, *axis, ksize=3, scale=0.125) for axis in ((1, 0), (0, 1))
+        )
+        levels.append(PyramidLevel(soft, slope_x, slope_y, origin, size / shape))
     return levels
 
 
-_AXES = ((1, 0), (0, 1))
-
-
 def _ideal(image, camera, low, high):
-    """The part of the image between two corners (pixels from the principal point).
+    """The image between corners `low`, `high` (2,), pixels of the ideal camera.
 
-    Returns it with its corner and its size in such pixels.
+    Returns:
+        the part (h, w, 3), its corner (2,) and its size (2,), pixels of the ideal camera.
     """
     k = camera.calibration
     squeeze = np.array([1.0, k[1, 1] / k[0, 0]])

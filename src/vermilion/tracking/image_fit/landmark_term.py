@@ -1,4 +1,4 @@
-"""The landmarks of one frame as part of its energy: the same terms as in the landmark fit."""
+"""The landmark term of one frame's energy: the same as in the landmark fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.tracking.landmark_fit.expression import (
     N_POSE,
-    FitSettings,
+    LandmarkFitSettings,
     landmark_cost,
     landmark_equations,
 )
@@ -23,9 +23,9 @@ class LandmarkTerm:
 
     Attributes:
         shape: the person's landmarks.
-        seen: one frame.
+        seen: landmarks of the frame.
         focal_px: of the camera.
-        sigma_px: (N,) deviations.
+        sigma_px: (1, N) deviations of the detected landmarks.
         settings: of the landmark fit.
     """
 
@@ -33,7 +33,7 @@ class LandmarkTerm:
     seen: Observations
     focal_px: float
     sigma_px: np.ndarray
-    settings: FitSettings
+    settings: LandmarkFitSettings
 
     @classmethod
     def of(
@@ -42,21 +42,21 @@ class LandmarkTerm:
         seen: Observations,
         focal_px: float,
         depth_mm: float,
-        settings: FitSettings,
+        settings: LandmarkFitSettings,
     ) -> LandmarkTerm:
-        """With deviations that are a share of the inter-ocular distance at `depth_mm`."""
+        """The term whose deviations are a share of the inter-ocular distance at `depth_mm`."""
         sigma = shape.sigma_mm(settings.noise) * focal_px / depth_mm
         return cls(shape, seen, focal_px, sigma[None], settings)
 
     def cost(self, x: np.ndarray, reference: np.ndarray) -> float:
-        """Of unknowns x (6 + K): rotation vector about `reference` (3, 3), translation, weights."""
+        """Cost at x (P,): rotation vector about `reference` (3, 3), translation, weights."""
         points = self.shape.points(x[N_POSE:]) @ (rotation_matrix(x[:3]) @ reference).T + x[3:6]
         return landmark_cost(points[None], self.seen, self.focal_px, self.sigma_px, self.settings)
 
     def normal_equations(
         self, x: np.ndarray, reference: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Gauss-Newton matrix (P, P) and gradient (P,) at x (P,)."""
+        """Gauss-Newton matrix (P, P) and gradient (P,) at x (P,), about `reference` (3, 3)."""
         matrix, gradient = landmark_equations(
             self.shape, self.seen, self.focal_px, self.sigma_px, reference, x[None], self.settings
         )

@@ -1,4 +1,4 @@
-"""Images of the refinement: what was estimated, and what is left unexplained."""
+"""Images of the image fit: the estimated appearance, and the errors that remain."""
 
 from __future__ import annotations
 
@@ -15,19 +15,27 @@ from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.draw import colour_map, label, tile, to_display
 from vermilion.tracking.image_fit.take import TakeStart
-from vermilion.tracking.overlay import cut_to
+from vermilion.tracking.overlay import crop_to_points
 
 _WORST = 40.0  # display values at the hottest colour
 
 
-def to_vertices(
+def samples_to_vertices(
     values: np.ndarray,
     trust: np.ndarray,
     samples: SurfacePoints,
     triangles: np.ndarray,
     count: int,
 ) -> np.ndarray:
-    """Values at the samples (N, C) as means at the vertices (V, C); the overall mean where unseen."""
+    """Weighted means (V, C) at the vertices of values at the samples; the overall mean where unseen.
+
+    Args:
+        values: (N, C) at the samples.
+        trust: (N,) weights of the samples.
+        samples: N points of the mesh.
+        triangles: (T, 3) of the mesh.
+        count: vertices of the mesh.
+    """
     at = samples.matrix(triangles, count)
     weight = at.T @ trust
     total = (trust[:, None] * values).sum(axis=0) / max(trust.sum(), 1e-9)
@@ -41,7 +49,10 @@ def appearance_image(
     """Image, model, albedo and light side by side, (h, w, 3) uint8.
 
     Args:
-        image: (h, w, 3) linear; x: (6 + K,) of its frame.
+        image: (h, w, 3) linear RGB.
+        start: the take.
+        x: (6 + K,) rotation vector, translation, weights of the image's frame.
+        appearance: of the take.
     """
     camera, triangles = start.camera, start.model.triangles
     local = start.vertices(x)
@@ -49,27 +60,27 @@ def appearance_image(
     hits = RayCaster(world, triangles).see(camera)
     normals = interpolate(hits, triangles, vertex_normals(local, triangles))
     light = irradiance(normalised(normals), appearance.light)
-    vertices = to_vertices(
+    vertices = samples_to_vertices(
         appearance.albedo[0], np.minimum(appearance.seen, 1.0), appearance.samples, triangles,
         len(local),
     )  # fmt: skip
     albedo = interpolate(hits, triangles, vertices)
     place, original = camera.project(world), to_display(image)
-    panels = [label(cut_to(original, place), "image")]
+    panels = [label(crop_to_points(original, place), "image")]
     for name, colours in (("model", albedo * light), ("albedo", albedo), ("light", 0.5 * light)):
         shown = np.where(hits.hit[..., None], to_display(colours), original)
-        panels.append(label(cut_to(shown, place), name))
+        panels.append(label(crop_to_points(shown, place), name))
     return np.hstack(panels)
 
 
 def residual_sheet(
     rows: Sequence[tuple[str, np.ndarray, Sequence[tuple]]], camera: Camera
 ) -> np.ndarray:
-    """A row a frame, a column a step: the image, and the error at every sample by its colour.
+    """Error of every sample as a colour: a row a frame, a column a step, (h, w, 3) uint8.
 
     Args:
         rows: (name, image (h, w, 3) linear, [(label, errors (N, 3), trust (N,), place (N, 2))]);
-            places in pixels from the principal point of the ideal pinhole.
+            places in pixels from the principal point of the ideal pinhole camera.
         camera: of the images.
     """
     if not rows:
@@ -80,7 +91,7 @@ def residual_sheet(
     for name, image, results in rows:
         original = to_display(image)
         points = results[0][3] * squeeze + k[:2, 2]
-        panels.append(label(cut_to(original, points), name))
+        panels.append(label(crop_to_points(original, points), name))
         for text, errors, trust, place in results:
             panels.append(
                 label(
@@ -99,4 +110,4 @@ def _error_image(original, points, errors, trust, place):
     shown = original.copy()
     for (column, row), colour in zip(place[seen], colours.astype(int).tolist(), strict=True):
         cv2.circle(shown, (int(column), int(row)), radius, colour, -1)
-    return cut_to(shown, points)
+    return crop_to_points(shown, points)

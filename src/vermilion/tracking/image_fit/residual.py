@@ -1,4 +1,4 @@
-"""How well the model explains an image: what every refinement must lower."""
+"""The photometric residual of a frame: every step of the track should lower it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.imaging.display import to_display_values
-from vermilion.tracking.image_fit.frame_fit import View
+from vermilion.tracking.image_fit.frame_fit import FrameView
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
 
 
 def sample_errors(
-    view: View,
+    view: FrameView,
     x: np.ndarray,
     face: SampledFace,
     appearance: Appearance,
     offsets_mm: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image less model at each sample, in display values (0 to 255).
+    """Image minus model at each sample, display values (0 to 255).
 
     Args:
-        x: (6 + K,) pose and weights, about the view's reference.
-        offsets_mm: (N, 3) of the samples in the head frame.
+        view: the frame.
+        x: (6 + K,) rotation vector about `view.reference`, translation, weights.
+        face: the person at the samples.
+        appearance: of the take, at the same samples.
+        offsets_mm: (N, 3) offsets of the samples, head frame.
 
     Returns:
         errors (N, 3); trust (N,), zero where not seen; place (N, 2) in pixels from the principal
@@ -40,5 +43,5 @@ def sample_errors(
 
 
 def photometric_residual(errors: np.ndarray, trust: np.ndarray) -> float:
-    """Mean absolute error over the visible face, display values (0 to 255)."""
+    """Mean of absolute `errors` (N, 3) weighted by `trust` (N,), display values (0 to 255)."""
     return float((trust * np.abs(errors).mean(axis=1)).sum() / max(trust.sum(), 1e-9))

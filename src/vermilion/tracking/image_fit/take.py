@@ -1,34 +1,32 @@
-"""One take's landmark fit as the start of its refinement: views of frames, and what they show."""
+"""A take before the image fit: its landmark fit, the data of its frames, its appearance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from vermilion.appearance.estimate import Appearance, Sightings, estimate_appearance
+from vermilion.appearance.estimate import Appearance, SampleObservations, estimate_appearance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import log_about_mean, rotation_matrix
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.errors import InputError
-from vermilion.storage.progress import progress
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, View, visible_trust
-from vermilion.tracking.image_fit.image_levels import levels_of
+from vermilion.tracking.image_fit.frame_fit import FrameProblem, FrameView, visible_trust
+from vermilion.tracking.image_fit.image_levels import image_pyramid
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, project
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import fit_settings
+from vermilion.tracking.settings import landmark_fit_settings
 
 
 class StartFiles(Protocol):
-    """Paths that a refinement starts from."""
+    """Input files of the image fit."""
 
     tracker: str
     identity: str
@@ -38,14 +36,14 @@ class StartFiles(Protocol):
 
 @dataclass(frozen=True)
 class TakeStart:
-    """A take before its refinement.
+    """A take before the image fit.
 
     Attributes:
         model: the tracker's.
         identity: of the person.
         camera: of the images, with the focal length that was used.
         x: (F, 6 + K) the landmark fit: rotation vector about `reference`, translation, weights.
-        reference: (3, 3).
+        reference: (3, 3) rotation, the mean of the whole take.
         seen: landmarks of the F frames.
         settings: of the landmark fit.
     """
@@ -56,7 +54,7 @@ class TakeStart:
     x: np.ndarray
     reference: np.ndarray
     seen: Observations
-    settings: FitSettings
+    settings: LandmarkFitSettings
 
     @classmethod
     def of(
@@ -65,13 +63,13 @@ class TakeStart:
         identity: Identity,
         fit: TrackedTake,
         track: LandmarkTrack,
-        settings: FitSettings,
+        settings: LandmarkFitSettings,
         rows: np.ndarray | None = None,
     ) -> TakeStart:
-        """Some rows of a landmark fit (all by default); `track` has these frames' landmarks."""
+        """Some `rows` (n,) of a landmark fit (all by default); `track` has these frames' landmarks."""
         camera = fit.camera
         rotation = camera.rotation @ fit.world_from_head_rotation
-        # The chart is the whole take's, so that chunks can be joined.
+        # The mean rotation is the whole take's, so that chunks can be smoothed together.
         vectors, reference = log_about_mean(rotation)
         translation = camera.to_camera(fit.world_from_head_translation_mm)
         x = np.concatenate([vectors, translation, fit.weights], axis=1)
@@ -88,16 +86,20 @@ class TakeStart:
         cfg: Mapping[str, dict[str, Any]],
         frames: Sequence[int] | None = None,
     ) -> tuple[TrackedTake, np.ndarray, TakeStart]:
-        """(the take's track, rows of some frames in it, these frames): of files; all frames by default.
+        """Read some frames of a take; all frames by default.
 
         Args:
             inputs: paths `tracker`, `identity`, `fit` and `landmarks` (one, or one a chunk).
             cfg: sections `tracking.fit` and `tracking.motion`.
+            frames: numbers of the frames.
+
+        Returns:
+            the take's track, the rows (n,) of the frames in it, and the frames.
         """
         fit = TrackedTake.load(inputs.fit)
         rows = np.arange(len(fit.frames)) if frames is None else fit.index_of(frames)
         track = LandmarkTrack.load(inputs.landmarks)
-        settings = fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
+        settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
         model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
         return fit, rows, cls.of(model, identity, fit, track, settings, rows)
 
@@ -106,12 +108,12 @@ class TakeStart:
         return SampledFace.of(self.model, self.identity.neutral_mm, samples)
 
     def vertices(self, x: np.ndarray) -> np.ndarray:
-        """Mesh (V, 3) of unknowns (6 + K,) in the camera frame."""
+        """Mesh (V, 3) mm, camera frame, of x (6 + K,): rotation vector, translation, weights."""
         local = self.model.vertices(self.identity.identity, x[N_POSE:])
         return local @ (rotation_matrix(x[:3]) @ self.reference).T + x[3:6]
 
     def with_motion(self, fit: TrackedTake, x: np.ndarray) -> TrackedTake:
-        """`fit` with other poses and weights x (F, 6 + K), all frames of the take."""
+        """`fit` with poses and weights x (F, 6 + K) of all frames of the take."""
         rotation = rotation_matrix(x[:, :3]) @ self.reference
         to_world = self.camera.rotation.T
         shape = self.landmark_shape()
@@ -137,14 +139,14 @@ class TakeStart:
 
     def view(
         self, row: int, image: np.ndarray, face: SampledFace, pixel_mm: float, levels: int
-    ) -> View:
-        """What the refinement of one frame needs, from its image (h, w, 3) linear."""
+    ) -> FrameView:
+        """Data of the frame at `row`, from its image (h, w, 3), linear RGB."""
         x, focal = self.x[row], focal_px(self.camera)
         rotation = rotation_matrix(x[:3]) @ self.reference
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
-        return View(
-            levels_of(image, self.camera, points, pixel_mm, levels),
+        return FrameView(
+            image_pyramid(image, self.camera, points, pixel_mm, levels),
             focal,
             visible_trust(self.model, self.vertices(x), points, normals),
             LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
@@ -153,8 +155,10 @@ class TakeStart:
         )
 
 
-def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sightings:
-    """What views show at the samples, the face being at unknowns xs (6 + K each)."""
+def observe_samples(
+    views: list[FrameView], xs: list[np.ndarray], face: SampledFace
+) -> SampleObservations:
+    """Colours of the samples in some frames, with poses and weights `xs`, each (6 + K,)."""
     colours, normals, trust = [], [], []
     for view, x in zip(views, xs, strict=True):
         rotation = rotation_matrix(x[:3]) @ view.reference
@@ -163,66 +167,34 @@ def sightings(views: list[View], xs: list[np.ndarray], face: SampledFace) -> Sig
         colours.append(np.stack([values for values, _, _ in found]))
         normals.append(face.normals(x[N_POSE:]) @ rotation.T)
         trust.append(view.trust * found[0][2])
-    return Sightings(np.stack(colours), np.stack(normals), np.stack(trust))
+    return SampleObservations(np.stack(colours), np.stack(normals), np.stack(trust))
 
 
 def learn_appearance(
     frames: np.ndarray,
-    views: list[View],
+    views: list[FrameView],
     face: SampledFace,
     samples: SurfacePoints,
     albedo_prior: float,
     rounds: int,
     problem_of: Callable[[Appearance], FrameProblem],
 ) -> Appearance:
-    """Light and albedo from some frames, whose poses and expressions are improved in turns with it."""
+    """Light and albedo from some frames, alternating with their poses and expressions.
+
+    Args:
+        frames: (M,) int numbers.
+        views: data of these frames.
+        face: the person at the samples.
+        samples: places on the skin.
+        albedo_prior: weight of the skin's median colour at each sample, in frames.
+        rounds: of appearance, then poses and expressions.
+        problem_of: the energy of a frame under an appearance.
+    """
     xs = [view.start for view in views]
     for _ in range(rounds):
-        appearance = estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
+        appearance = estimate_appearance(
+            frames, samples, observe_samples(views, xs, face), albedo_prior
+        )
         problem = problem_of(appearance)
         xs = [problem.solve(view).x for view in views]
-    return estimate_appearance(frames, samples, sightings(views, xs, face), albedo_prior)
-
-
-def readable(
-    valid: np.ndarray, read: Callable[[int], np.ndarray], name: str
-) -> Iterator[tuple[int, np.ndarray]]:
-    """(row, image) of the valid rows (F,) bool; those that `read` cannot give are left out.
-
-    The capture stage has flagged them. Progress is reported under `name`.
-    """
-    for row in progress(np.flatnonzero(valid), name):
-        try:
-            yield row, read(row)
-        except InputError:
-            continue
-
-
-def refine_frames(
-    start: TakeStart,
-    valid: np.ndarray,
-    read: Callable[[int], np.ndarray],
-    problem: FrameProblem,
-    pixel_mm: float,
-) -> dict[str, np.ndarray]:
-    """Refine the frames of a `TakeStart` one by one.
-
-    Frames that are not valid (F,), or whose image `read` (row -> linear RGB) cannot give, keep the
-    landmark fit.
-
-    Returns:
-        x (F, P), matrix (F, P, P), right (F, P) of `FrameFit`, refined (F,) bool.
-    """
-    n_frames, n_params = start.x.shape
-    result = {
-        "x": start.x.copy(),
-        "matrix": np.zeros((n_frames, n_params, n_params)),
-        "right": np.zeros((n_frames, n_params)),
-        "refined": np.zeros(n_frames, dtype=bool),
-    }
-    levels = len(problem.settings.iterations)
-    for row, image in readable(valid, read, "photometric refinement"):
-        found = problem.solve(start.view(row, image, problem.face, pixel_mm, levels))
-        result["x"][row], result["matrix"][row] = found.x, found.matrix
-        result["right"][row], result["refined"][row] = found.right, True
-    return result
+    return estimate_appearance(frames, samples, observe_samples(views, xs, face), albedo_prior)

@@ -1,8 +1,8 @@
-"""Quadratic problems over all frames of a take with a box on every unknown.
+"""Box-constrained quadratic programs over all frames of a take.
 
-The unknowns are x (F, P): P numbers a frame. The matrix is block diagonal (one block a frame) plus
-smoothness over time that couples each parameter with itself in the next two frames; stored as a
-band, so that a whole take is solved at once, exactly, and no result depends on chunks.
+The unknowns are x (F, P): P parameters a frame. The matrix has one block a frame, and smoothness
+over time that couples each parameter with itself in the next two frames. It is stored as a band, so
+that one exact solve covers the whole take and the result does not depend on chunks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ class BandMatrix:
 
     Args:
         blocks: (F, P, P) symmetric blocks on the diagonal.
-        second, first: (F - 2, P) and (F - 1, P) weights of squared second and first differences.
+        second: (F - 2, P) weights of squared second differences over time.
+        first: (F - 1, P) weights of squared first differences over time.
     """
 
     def __init__(self, blocks: np.ndarray, second: np.ndarray, first: np.ndarray):
@@ -42,7 +43,7 @@ class BandMatrix:
                 self.band[self.u - (j - i) * p, columns] += (a * b * weights).reshape(-1)
 
     def times(self, x: np.ndarray) -> np.ndarray:
-        """Product with x (F, P)."""
+        """Product (F, P) with x (F, P)."""
         flat = x.reshape(-1)
         result = self.band[self.u] * flat
         for offset in range(1, self.u + 1):
@@ -52,7 +53,7 @@ class BandMatrix:
         return result.reshape(x.shape)
 
     def solve_free(self, right: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """Solve for the free unknowns (F, P) bool with the others held at zero."""
+        """Solution (F, P) for `right` (F, P) over the `free` (F, P) bool unknowns, the others zero."""
         band, fixed = self.band.copy(), ~free.reshape(-1)
         for offset in range(1, self.u + 1):
             row = band[self.u - offset, offset:]
@@ -66,8 +67,8 @@ class BandMatrix:
 def solve_in_box(
     matrix: BandMatrix,
     right: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
+    lower: np.ndarray | float,
+    upper: np.ndarray | float,
     start: np.ndarray | None = None,
     iterations: int = 30,
 ) -> np.ndarray:
@@ -76,8 +77,9 @@ def solve_in_box(
     Args:
         matrix: A, positive definite.
         right: b, (F, P).
-        lower, upper: (P,) or (F, P), may be infinite.
-        start: a feasible first guess (F, P).
+        lower, upper: (P,) or (F, P) or one number, may be infinite.
+        start: (F, P) first guess within the box; zero by default.
+        iterations: Newton steps, at most.
 
     Returns:
         x (F, P), within the box.

@@ -1,12 +1,12 @@
 """Pose and blend weights of a whole take from its landmarks (Mono13 6, full perspective).
 
-All frames are solved at once, by Gauss-Newton on
+Gauss-Newton solves all frames at once. The energy is
 
     sum over frames and landmarks of rho(|whitened residual|)       rho: Cauchy
     + sum over frames of |w_f|^2 / weight_sigma^2                    w in [0, 1]
     + sum over frames of |second difference of pose and weights|^2   over their typical sizes
 
-Being symmetric in time, smoothing does not lag.
+Smoothing is symmetric in time: it does not lag.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vermilion.geometry.rotations import exp_about_mean, log_about_mean
-from vermilion.storage.errors import InputError
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.observation import (
     LandmarkNoise,
@@ -24,6 +23,7 @@ from vermilion.tracking.landmark_fit.observation import (
     pose_jacobian,
     project,
     projection_jacobian,
+    require_landmarks,
     robust_cost,
     robust_weights,
     whitening,
@@ -36,7 +36,7 @@ _FRAMES_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class FitSettings:
+class LandmarkFitSettings:
     """What is typical of landmarks, faces and heads; the same for everybody.
 
     Attributes:
@@ -44,8 +44,8 @@ class FitSettings:
         weight_sigma: deviation of a blend weight about zero.
         rotation_acceleration_deg, translation_acceleration_mm, weight_acceleration: typical
             accelerations, per second squared; infinite switches smoothness off.
-        jaw_slide: how far the position along the jaw's line counts, 0 to 1.
-        iterations: of Gauss-Newton, at most.
+        jaw_slide: weight of the residual along the jaw line, 0 (slides freely) to 1.
+        iterations: Gauss-Newton steps, at most.
         tolerance_mm: stop when no landmark moves more.
     """
 
@@ -72,10 +72,10 @@ class HeadMotion:
 
     Attributes:
         rotation: (F, 3, 3) camera from head.
-        translation_mm: (F, 3).
+        translation_mm: (F, 3) of the head in the camera frame.
         weights: (F, K) in [0, 1].
-        reprojection_px: (F,) root mean square over the landmarks but the jaw's; NaN where the
-            landmarks were not found.
+        reprojection_px: (F,) RMS over all landmarks except the jaw's; NaN where the landmarks were
+            not found.
     """
 
     rotation: np.ndarray
@@ -89,13 +89,21 @@ def fit_motion(
     seen: Observations,
     focal_px: float,
     fps: float,
-    settings: FitSettings | None = None,
+    settings: LandmarkFitSettings | None = None,
 ) -> HeadMotion:
     """Fit all frames of a take. Frames without landmarks are interpolated.
 
-    Raises InputError where no frame has landmarks.
+    Args:
+        shape: the person's landmarks.
+        seen: F frames.
+        focal_px: of the camera.
+        fps: frames a second.
+        settings: noise and priors.
+
+    Raises:
+        InputError: no frame has landmarks.
     """
-    settings = settings or FitSettings()
+    settings = settings or LandmarkFitSettings()
     problem = _TakeProblem(shape, seen, focal_px, fps, settings)
     x = problem.first_guess()
     cost = problem.cost(x)
@@ -118,13 +126,15 @@ def fit_motion(
 class _TakeProblem:
     """The energy above; unknowns x (F, 6 + K): rotation vector, translation, weights."""
 
-    def __init__(self, shape, seen, focal_px, fps, settings):
-        if not seen.valid.any():
-            raise InputError(
-                "no frame with landmarks",
-                "a face in at least one frame",
-                "Look at the landmark overlays; check the detector's settings.",
-            )
+    def __init__(
+        self,
+        shape: LandmarkShape,
+        seen: Observations,
+        focal_px: float,
+        fps: float,
+        settings: LandmarkFitSettings,
+    ):
+        require_landmarks([seen])
         self.shape, self.seen, self.focal, self.settings = shape, seen, focal_px, settings
         self.n_frames, self.n_weights = len(seen.image), shape.n_expressions
         self.sigma_mm = shape.sigma_mm(settings.noise)
@@ -145,6 +155,7 @@ class _TakeProblem:
         return triples[:, None] * strength, first
 
     def first_guess(self) -> np.ndarray:
+        """(F, 6 + K) of each frame fitted independently, gaps interpolated."""
         known = np.flatnonzero(self.seen.valid)
         focal = np.full(len(known), self.focal)
         rotation, translation, weights = first_guess(
@@ -163,6 +174,7 @@ class _TakeProblem:
         return points @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
 
     def cost(self, x: np.ndarray) -> float:
+        """The energy at x (F, 6 + K)."""
         total = landmark_cost(
             self._camera_points(x), self.seen, self.focal, self.sigma_px, self.settings
         )
@@ -173,7 +185,7 @@ class _TakeProblem:
         return float(total)
 
     def quadratic_minimum(self, x: np.ndarray) -> np.ndarray:
-        """Minimum, within the box, of the energy's quadratic model at x."""
+        """Minimum (F, 6 + K), within the box, of the energy's quadratic model at x (F, 6 + K)."""
         blocks, right = self._data_terms(x)
         diagonal = np.arange(N_POSE + self.n_weights)
         blocks[:, diagonal, diagonal] += self.prior
@@ -193,9 +205,11 @@ class _TakeProblem:
         return np.concatenate(blocks), np.concatenate(right)
 
     def largest_move_mm(self, a: np.ndarray, b: np.ndarray) -> float:
+        """Largest distance of a landmark between states a (F, 6 + K) and b (F, 6 + K)."""
         return float(np.linalg.norm(self._camera_points(a) - self._camera_points(b), axis=-1).max())
 
     def motion(self, x: np.ndarray) -> HeadMotion:
+        """Pose and expression of the state x (F, 6 + K)."""
         image = project(self._camera_points(x), self.focal)
         squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, self.seen.landmark_set.compared]
         reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
@@ -208,9 +222,17 @@ def landmark_cost(
     seen: Observations,
     focal_px: float,
     sigma_px: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> float:
-    """Landmark term of the energy, the model's landmarks being at (F, N, 3) in the camera frame."""
+    """Landmark term of the energy.
+
+    Args:
+        points_mm: (F, N, 3) the model's landmarks, camera frame.
+        seen: F frames.
+        focal_px: of the camera.
+        sigma_px: (F, N) deviations of the detected landmarks.
+        settings: of the fit.
+    """
     _, residual = _whitened(points_mm, seen, focal_px, sigma_px, settings)
     return float(robust_cost(residual, settings.noise.robust_sigmas).sum())
 
@@ -222,14 +244,14 @@ def landmark_equations(
     sigma_px: np.ndarray,
     reference: np.ndarray,
     x: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Newton matrices (F, P, P) and gradients (F, P) of the landmark term.
 
     Args:
-        sigma_px: (F, N).
-        reference: (3, 3), which the rotation vectors turn.
-        x: (F, P = 6 + K) rotation vector, translation, weights.
+        sigma_px: (F, N) deviations of the detected landmarks.
+        reference: (3, 3) rotation that the rotation vectors are relative to.
+        x: (F, P) rotation vector, translation, weights; P = 6 + K.
     """
     turned, by_rotation = pose_jacobian(x[:, :3], reference, shape.points(x[:, N_POSE:]))
     points = turned + x[:, None, 3:6]
@@ -250,7 +272,7 @@ def _whitened(
     seen: Observations,
     focal_px: float,
     sigma_px: np.ndarray,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whitening matrices (F, N, 2, 2) and whitened residuals (F, N, 2)."""
     image = project(points_mm, focal_px)

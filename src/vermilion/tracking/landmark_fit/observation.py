@@ -1,7 +1,8 @@
-"""How a model's landmarks appear in the images: residuals, their derivatives, their trust."""
+"""Observed landmarks against the model's: residuals, their derivatives, their weights."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
+from vermilion.storage.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -27,18 +29,18 @@ class LandmarkNoise:
     robust_sigmas: float = 3.0
 
     def per_landmark(self, landmark_set: LandmarkSet = IBUG66) -> np.ndarray:
-        """(N,) of the points of a set."""
+        """Deviations (N,) of the points of a set, inter-ocular distances."""
         kinds = {name: getattr(self, name) for name in ("jaw", "brows", "nose", "eyes", "mouth")}
         return landmark_set.per_point(kinds)
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Landmarks of frames relative to the principal point of an ideal pinhole camera.
+    """Landmarks of F frames relative to the principal point of an ideal pinhole camera.
 
     Attributes:
-        image: (F, N, 2) pixels from the principal point (zero where not valid).
-        trust: (F, N) in [0, 1]; zero where not valid.
+        image: (F, N, 2) pixels from the principal point; zero where not valid.
+        trust: (F, N) confidence in [0, 1]; zero where not valid.
         valid: (F,) bool.
         landmark_set: what the N points are.
     """
@@ -50,7 +52,7 @@ class Observations:
 
     @classmethod
     def of(cls, track: LandmarkTrack, camera: Camera) -> Observations:
-        """Undo the camera's distortion; x and y scaled to the x focal length."""
+        """Landmarks without the camera's distortion, x and y scaled to the x focal length."""
         valid = track.valid & np.isfinite(track.points_px).all(axis=(1, 2))
         pixels = np.where(valid[:, None, None], track.points_px, 0.5)
         _, directions = camera.rays(pixels)
@@ -60,9 +62,20 @@ class Observations:
         image = np.where(valid[:, None, None], image, 0.0)
         return cls(image, trust, valid, track.landmark_set)
 
-    def __getitem__(self, frames: np.ndarray) -> Observations:
+    def __getitem__(self, frames: np.ndarray | slice | list[int]) -> Observations:
+        """Some frames: a mask (F,) or rows (n,)."""
         return replace(
             self, image=self.image[frames], trust=self.trust[frames], valid=self.valid[frames]
+        )
+
+
+def require_landmarks(takes: Sequence[Observations]) -> None:
+    """Raise InputError where no frame of any take has landmarks."""
+    if not any(seen.valid.any() for seen in takes):
+        raise InputError(
+            "no frame with landmarks",
+            "a face in at least one frame",
+            "Look at the landmark overlays; check the detector's settings.",
         )
 
 
@@ -72,7 +85,7 @@ def focal_px(camera: Camera) -> float:
 
 
 def with_focal(camera: Camera, focal: float | None) -> Camera:
-    """The camera with another focal length, its ratio y to x kept; the same where it is None."""
+    """The camera with another x focal length (px), its ratio of y to x kept; None changes nothing."""
     if focal is None:
         return camera
     model = camera.colmap()
@@ -83,13 +96,16 @@ def with_focal(camera: Camera, focal: float | None) -> Camera:
 
 
 def project(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
-    """Points (..., 3) in the camera frame to pixels from the principal point, (..., 2)."""
+    """Pixels (..., 2) from the principal point of `points_mm` (..., 3) in the camera frame.
+
+    `focal` (...,) is in pixels.
+    """
     focal = np.asarray(focal)[..., None] if np.ndim(focal) else focal
     return focal * points_mm[..., :2] / points_mm[..., 2:3]
 
 
 def projection_jacobian(points_mm: np.ndarray, focal: float | np.ndarray) -> np.ndarray:
-    """Derivative of `project` by the point, (..., 2, 3)."""
+    """Derivative (..., 2, 3) of `project` by `points_mm` (..., 3); `focal` (...,) in pixels."""
     x, y, z = np.moveaxis(points_mm, -1, 0)
     zero = np.zeros_like(x)
     rows = [[1 / z, zero, -x / z**2], [zero, 1 / z, -y / z**2]]
@@ -104,15 +120,16 @@ def whitening(
     jaw_slide: float,
     jaw_ids: np.ndarray = IBUG66.jaw,
 ) -> np.ndarray:
-    """Matrices (F, N, 2, 2) that turn residuals into deviations.
+    """Matrices (F, N, 2, 2) that turn residuals in pixels into standard deviations.
 
-    Landmarks of the jaw slide along its line: only the part of the residual across it counts, the
-    part along it by `jaw_slide` (0 to 1).
+    Landmarks of the jaw slide along the jaw line: the residual across the line counts in full, the
+    residual along it by `jaw_slide` (0 to 1).
 
     Args:
-        points_px: (F, N, 2) projected model landmarks.
+        points_px: (F, N, 2) projected landmarks of the model.
         sigma_px: (F, N) deviations.
-        trust: (F, N).
+        trust: (F, N) confidence in [0, 1].
+        jaw_slide: see above.
         jaw_ids: landmarks of the jaw's line, in its order.
     """
     scale = np.sqrt(trust) / sigma_px
@@ -146,10 +163,10 @@ def pose_jacobian(
 
 
 def robust_weights(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy weights (F, N) of whitened residuals (F, N, 2)."""
+    """Cauchy weights (F, N) of whitened residuals `deviations` (F, N, 2)."""
     return 1.0 / (1.0 + (deviations**2).sum(axis=-1) / limit**2)
 
 
 def robust_cost(deviations: np.ndarray, limit: float) -> np.ndarray:
-    """Cauchy cost (F, N) of whitened residuals, whose weights `robust_weights` are."""
+    """Cauchy cost (F, N) of whitened residuals `deviations` (F, N, 2); see `robust_weights`."""
     return 0.5 * limit**2 * np.log1p((deviations**2).sum(axis=-1) / limit**2)

@@ -1,4 +1,4 @@
-"""The face model at its landmarks: all that fitting to landmarks needs of it."""
+"""The face model at its landmarks: all that a landmark fit needs of it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ class LandmarkShape:
         """Landmarks of a person.
 
         Args:
-            offset_mm: (N, 3) as `Identity.landmark_offset_mm`.
+            model: the face model.
+            identity: (I,) in standard deviations; the mean face by default.
+            offset_mm: (N, 3) head frame, as `Identity.landmark_offset_mm`; zero by default.
             places: of the landmarks on the model; None: the 66 vertices that it names.
         """
         neutral = landmark_neutral(model, places)
@@ -68,17 +70,17 @@ class LandmarkShape:
         return sigma if self.known is None else np.where(self.known, sigma, np.inf)
 
     def points(self, weights: np.ndarray) -> np.ndarray:
-        """Landmarks (..., N, 3) of weights (..., K)."""
+        """Landmarks (..., N, 3) of `weights` (..., K), head frame."""
         return self.neutral_mm + np.tensordot(weights, self.expressions_mm, axes=(-1, 0))
 
 
 def landmark_neutral(model: FaceModel, places: LandmarkPlaces | None = None) -> np.ndarray:
-    """(N, 3) landmarks of the mean face."""
+    """Landmarks (N, 3) mm of the mean face, head frame."""
     return _at_landmarks(model.neutral_mm, model, places)
 
 
 def landmark_identities(model: FaceModel, places: LandmarkPlaces | None = None) -> np.ndarray:
-    """(I, N, 3) displacements at one standard deviation."""
+    """Displacements (I, N, 3) mm of the landmarks at one standard deviation of each mode."""
     return _at_landmarks(model.identities_mm, model, places)
 
 
@@ -89,17 +91,21 @@ def _at_landmarks(field: np.ndarray, model: FaceModel, places: LandmarkPlaces | 
     return places.of(field)
 
 
-def without_size(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
-    """Displacements (I, N, 3) less their share of uniform growth of the neutral (N, 3).
+def without_uniform_scale(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+    """`displacements_mm` (I, N, 3) without their component of uniform scale of `neutral_mm` (N, 3).
 
-    One camera cannot tell a small near head from a large far one. Left in, growth would be set by
-    what it does to the blend weights: on a smaller head the same motion needs smaller ones.
+    One camera cannot distinguish a small near head from a large far one. With scale left in, the
+    prior on the blend weights would choose it: on a smaller head the same motion needs smaller
+    weights.
     """
     centred = neutral_mm - neutral_mm.mean(axis=0)
-    return displacements_mm - growth(displacements_mm, neutral_mm)[:, None, None] * centred
+    return (
+        displacements_mm
+        - uniform_scale_share(displacements_mm, neutral_mm)[:, None, None] * centred
+    )
 
 
-def growth(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
-    """Share (I,) of uniform growth of the neutral (N, 3) in displacements (I, N, 3)."""
+def uniform_scale_share(displacements_mm: np.ndarray, neutral_mm: np.ndarray) -> np.ndarray:
+    """Uniform scale (I,) of `neutral_mm` (N, 3) contained in `displacements_mm` (I, N, 3)."""
     centred = neutral_mm - neutral_mm.mean(axis=0)
     return np.tensordot(displacements_mm, centred, axes=([1, 2], [0, 1])) / (centred**2).sum()

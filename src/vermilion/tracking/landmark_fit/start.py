@@ -1,4 +1,4 @@
-"""A first guess: scaled orthographic pose and blend weights in turns (Mono13 6.2, eqs. 6 to 8)."""
+"""First guess: scaled orthographic pose and blend weights, alternating (Mono13 6.2, eqs. 6-8)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ def first_guess(
     weight_sigma: float,
     rounds: int = 4,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose and weights of the valid frames, each by itself.
+    """Pose and weights of each frame, fitted independently.
 
     Args:
         shape: the person's landmarks.
         seen: F frames, all valid.
         sigma: (N,) deviations of the landmarks in millimetres at the head.
-        focal: (F,) pixels.
+        focal: (F,) focal lengths, pixels.
         weight_sigma: deviation of the blend weights about zero.
+        rounds: of pose, then weights.
 
     Returns:
         rotation (F, 3, 3) camera from head; translation (F, 3) mm; weights (F, K).
@@ -55,7 +56,7 @@ def first_guess(
 
 
 def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarray:
-    """Values (M, P) of the frames `known` (M,) to all frames (n_frames, P): linear, ends held."""
+    """Values (F, P) of all frames from `values` (M, P) of frames `known` (M,): linear, ends held."""
     every = np.arange(n_frames)
     columns = [np.interp(every, known, column) for column in values.T]
     return np.stack(columns, axis=1)

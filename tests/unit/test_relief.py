@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from vermilion.detail.relief.combine import combine
+from vermilion.detail.relief.combine import combine_positions_and_normals
+from vermilion.detail.relief.high_pass import HighPassFilter
 from vermilion.detail.relief.light import ClipLight, estimate_light
 from vermilion.detail.relief.normal_map import NormalMap
-from vermilion.detail.relief.relief import ReliefSettings, deviation, solve_relief
-from vermilion.detail.relief.short_range import DetailFilter
-from vermilion.detail.relief.sight import Sight
+from vermilion.detail.relief.relief import ReliefSettings, solve_relief, value_deviation
+from vermilion.detail.relief.skin_observation import SkinObservation
 from vermilion.detail.relief.subdivision import loop_subdivision
-from vermilion.detail.relief.tilts import averaged, tangents, tilted, tilts_of
+from vermilion.detail.relief.tilts import average_tilts, tangents, tilted_normals, tilts_of
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.mesh import normalised, triangle_normals, vertex_normals
 from vermilion.geometry.rotations import rotation_matrix
@@ -74,9 +74,9 @@ def test_known_bump_under_known_light_is_recovered(side, noise, left):
     n = len(topology.skin)
     grain = noise * np.random.default_rng(0).normal(size=(n, 1))
     smooth = triangle_normals(points, topology.skin) @ FACING.T
-    sight = Sight(light.values(shown) + grain, np.ones(n), smooth)
+    observed = SkinObservation(light.values(shown) + grain, np.ones(n), smooth)
     settings = ReliefSettings(detail_mm=20.0)
-    found = solve_relief(points, FACING, sight, light, topology, settings)
+    found = solve_relief(points, FACING, observed, light, topology, settings)
     near = np.hypot(points[:, 0] - 5, points[:, 1]) < 12
     wanted = vertex_normals(points + true[:, None] * normals, topology.skin)
     after = vertex_normals(points + found[:, None] * normals, topology.skin)
@@ -92,8 +92,8 @@ def test_noise_of_a_display_value_is_no_relief():
     normals, n = vertex_normals(points, topology.skin), len(topology.skin)
     smooth = triangle_normals(points, topology.skin) @ FACING.T
     grain = np.random.default_rng(0).normal(size=(n, 1))
-    sight = Sight(light.values(smooth) + grain, np.ones(n), smooth)
-    found = solve_relief(points, FACING, sight, light, topology, ReliefSettings())
+    observed = SkinObservation(light.values(smooth) + grain, np.ones(n), smooth)
+    found = solve_relief(points, FACING, observed, light, topology, ReliefSettings())
     after = vertex_normals(points + found[:, None] * normals, topology.skin)
     assert degrees_apart(after, normals).mean() < 0.5
 
@@ -103,8 +103,8 @@ def test_nothing_seen_and_nothing_different_move_nothing(trust):
     topology, points = dome()
     light, n = clip(topology), len(topology.skin)
     smooth = triangle_normals(points, topology.skin) @ FACING.T
-    sight = Sight(light.values(smooth), np.full(n, trust), smooth)
-    found = solve_relief(points, FACING, sight, light, topology, ReliefSettings())
+    observed = SkinObservation(light.values(smooth), np.full(n, trust), smooth)
+    found = solve_relief(points, FACING, observed, light, topology, ReliefSettings())
     assert np.abs(found).max() < 1e-9
 
 
@@ -113,8 +113,8 @@ def test_border_of_the_skin_stays():
     light, n = clip(topology), len(topology.skin)
     smooth = triangle_normals(points, topology.skin) @ FACING.T
     waves = 20 * np.sin(points[topology.skin].mean(axis=1)[:, :1])
-    sight = Sight(light.values(smooth) + waves, np.ones(n), smooth)
-    found = solve_relief(points, FACING, sight, light, topology, ReliefSettings())
+    observed = SkinObservation(light.values(smooth) + waves, np.ones(n), smooth)
+    found = solve_relief(points, FACING, observed, light, topology, ReliefSettings())
     assert np.abs(found[topology.border]).max() < 1e-4 < np.abs(found).max()
 
 
@@ -124,11 +124,11 @@ def test_edge_of_paint_is_trusted_less_the_worse_its_place_is_known():
     centres = points[topology.skin].mean(axis=1)
     light.albedo[centres[:, 0] > 0] = 0.1
     smooth = triangle_normals(points, topology.skin) @ FACING.T
-    sight = Sight(light.values(smooth), np.ones(n), smooth)
+    observed = SkinObservation(light.values(smooth), np.ones(n), smooth)
     edge = np.abs(centres[:, 0]) < 1
     for misplaced_mm, most in ((0.0, 1.01), (0.5, 100)):
         settings = ReliefSettings(misplaced_mm=misplaced_mm)
-        sigma = deviation(light, sight, topology, centres, settings)
+        sigma = value_deviation(light, observed, topology, centres, settings)
         assert sigma[~edge & (np.abs(centres[:, 0]) > 4)].max() < 3
         assert (sigma[edge].max() > 5) == (misplaced_mm > 0) and sigma.max() < most
 
@@ -136,14 +136,14 @@ def test_edge_of_paint_is_trusted_less_the_worse_its_place_is_known():
 def test_noise_of_a_clip_is_measured_and_its_light_found():
     topology, points = dome()
     true, n = clip(topology), len(topology.skin)
-    rng, sights = np.random.default_rng(2), []
+    rng, observations = np.random.default_rng(2), []
     for _ in range(10):
         turn = rotation_matrix(rng.normal(0, 0.05, 3))
         normals = triangle_normals(points @ turn.T, topology.skin) @ FACING.T
         values = true.values(normals) + 2.0 * rng.normal(size=(n, 1))
-        sights.append(Sight(values, np.ones(n), normals))
+        observations.append(SkinObservation(values, np.ones(n), normals))
     centres = points[topology.skin].mean(axis=1)
-    found = estimate_light(range(10), sights, topology, centres, 8.0)
+    found = estimate_light(range(10), observations, topology, centres, 8.0)
     inner = (np.abs(centres[:, :2]) < 25).all(axis=1)
     assert np.median(found.noise[inner]) == pytest.approx(2.0, abs=0.4)
     left = (found.values(normals) - true.values(normals)).mean(axis=1)
@@ -168,9 +168,11 @@ def test_normals_of_a_known_bump_give_the_bump():
     normals = vertex_normals(points, topology.skin)
     true = bump(points)
     wanted = vertex_normals(points + true[:, None] * normals, topology.skin)
-    found = combine(points, normals, wanted, topology, 0.02)
+    found = combine_positions_and_normals(points, normals, wanted, topology, 0.02)
     assert np.abs(found - true).max() < 0.06
-    assert np.abs(combine(points, normals, normals, topology, 0.02)).max() < 1e-9
+    assert (
+        np.abs(combine_positions_and_normals(points, normals, normals, topology, 0.02)).max() < 1e-9
+    )
 
 
 def test_tilts_return_the_normals_whatever_the_pose():
@@ -179,7 +181,7 @@ def test_tilts_return_the_normals_whatever_the_pose():
     fine = normalised(normals + np.random.default_rng(1).normal(0, 0.1, normals.shape))
     tangent = tangents(points, normals, topology)
     tilts = tilts_of(normals, tangent, fine)
-    assert tilted(normals, tangent, tilts) == pytest.approx(fine)
+    assert tilted_normals(normals, tangent, tilts) == pytest.approx(fine)
     turn = rotation_matrix(np.array([0.2, -0.5, 0.1]))
     turned = tangents(points @ turn.T, normals @ turn.T, topology)
     assert tilts_of(normals @ turn.T, turned, fine @ turn.T) == pytest.approx(tilts)
@@ -188,15 +190,17 @@ def test_tilts_return_the_normals_whatever_the_pose():
 def test_average_is_symmetric_and_cut_at_the_ends_of_the_take():
     tilts = {f: np.array([[float(f), 2.0 * f, 1.0]]) for f in range(9)}
     for frame in range(9):  # an even motion is not delayed
-        assert averaged(tilts.__getitem__, frame, (0, 8), 5)[0] == pytest.approx([frame, 2 * frame])
+        assert average_tilts(tilts.__getitem__, frame, (0, 8), 5)[0] == pytest.approx(
+            [frame, 2 * frame]
+        )
     tilts[4][:, 2] = 0  # what is not seen is taken from the neighbours
-    assert averaged(tilts.__getitem__, 4, (0, 8), 5)[0] == pytest.approx([4, 8])
+    assert average_tilts(tilts.__getitem__, 4, (0, 8), 5)[0] == pytest.approx([4, 8])
 
 
 def test_detail_is_what_changes_over_a_short_range():
     topology, points = dome()
     centres = points[topology.skin].mean(axis=1)
-    detail = DetailFilter(topology.pairs, centres, np.ones(len(centres)), 4.0)
+    detail = HighPassFilter(topology.pairs, centres, np.ones(len(centres)), 4.0)
     inner = (np.abs(centres[:, :2]) < 20).all(axis=1)
     wave, slow = (np.sin(centres[:, 0] * 2 * np.pi / length) for length in (4, 120))
     assert np.abs(detail(wave) - wave)[inner].max() < 0.2

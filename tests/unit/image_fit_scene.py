@@ -14,7 +14,7 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.result import Identity, TrackedTake
-from vermilion.tracking.settings import FitSettings
+from vermilion.tracking.settings import LandmarkFitSettings
 
 SIDE = 41
 CAMERA = pinhole("cam", 1200.0, 480, 480)
@@ -109,4 +109,4 @@ def take_parts(
 def take_start(model: FaceModel, truth: np.ndarray, x: np.ndarray) -> TakeStart:
     """Starts at x (F, P) with landmarks where the truth (F, P) has them."""
     fit, person, track = take_parts(model, truth, x)
-    return TakeStart.of(model, person, fit, track, FitSettings())
+    return TakeStart.of(model, person, fit, track, LandmarkFitSettings())

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vermilion.detail.flow.crop import Crop
-from vermilion.detail.flow.deformation import DeformationSettings, corrected_mesh, spread
+from vermilion.detail.flow.crop import FaceCrop
+from vermilion.detail.flow.deformation import DeformationSettings, deform_to_flow, one_per_cell
 from vermilion.detail.flow.pose import rigid_motion
 from vermilion.detail.flow.six_frame_flow import (
     FlowSettings,
@@ -110,7 +110,7 @@ def follow(flow_px, **settings):
     vertices, triangles = sheet()
     flow = np.broadcast_to(np.float32(flow_px), (240, 320, 2)).copy()
     everywhere = np.ones(len(vertices), dtype=bool)
-    moved = corrected_mesh(
+    moved = deform_to_flow(
         vertices, triangles, CAMERA, flow, np.ones((240, 320), bool), everywhere, everywhere,
         DeformationSettings(**settings),
     )  # fmt: skip
@@ -137,7 +137,7 @@ def test_hidden_vertices_keep_their_shape_beside_those_that_follow():
     vertices, triangles = sheet()
     visible = vertices[:, 0] < 0
     flow = np.broadcast_to(np.float32([4.0, 0.0]), (240, 320, 2)).copy()
-    moved = corrected_mesh(
+    moved = deform_to_flow(
         vertices, triangles, CAMERA, flow, np.ones((240, 320), bool), visible, visible,
         DeformationSettings(pose=False),
     )  # fmt: skip
@@ -169,13 +169,13 @@ def test_too_few_points_move_nothing():
 
 def test_one_vertex_of_each_square_is_chosen():
     pixels = np.random.default_rng(0).uniform(0, 40, (500, 2))
-    chosen = spread(pixels, np.arange(500), 8.0)
+    chosen = one_per_cell(pixels, np.arange(500), 8.0)
     cells = np.floor(pixels[chosen] / 8)
     assert len(np.unique(cells, axis=0)) == len(chosen) == 25
 
 
 def test_crop_sees_what_the_whole_image_sees():
-    crop = Crop.around(CAMERA, np.array([[100.0, 60], [220, 200]]), 0.1, 80)
+    crop = FaceCrop.around(CAMERA, np.array([[100.0, 60], [220, 200]]), 0.1, 80)
     assert max(crop.camera.width_px, crop.camera.height_px) == 80
     point = np.array([[5.0, -8, 10]])
     scale = np.array([crop.camera.width_px, crop.camera.height_px]) / crop.size_px
@@ -185,4 +185,4 @@ def test_crop_sees_what_the_whole_image_sees():
 
 def test_face_outside_the_image_is_refused():
     with pytest.raises(ValueError, match="outside the image"):
-        Crop.around(CAMERA, np.array([[-300.0, 10], [-200, 90]]), 0.05, 100)
+        FaceCrop.around(CAMERA, np.array([[-300.0, 10], [-200, 90]]), 0.05, 100)

@@ -1,4 +1,4 @@
-"""What an image shows at the triangles of the skin."""
+"""Colours of an image at the triangles of the skin."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vermilion.detail.flow.crop import Crop
+from vermilion.detail.flow.crop import FaceCrop
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, triangle_normals
@@ -15,17 +15,17 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.sampling import sample_bilinear
 
 _MARGIN = 0.06
-_GRAZING = 0.25  # cosine to the view below which a triangle tells nothing
+_GRAZING = 0.25  # cosine of normal and view below which a triangle has no trust
 
 
 @dataclass(frozen=True)
-class Sight:
-    """One frame.
+class SkinObservation:
+    """The skin's triangles in one frame.
 
     Attributes:
         colours: (Q, 3) display values 0 to 255.
-        trust: (Q,) in [0, 1]: how squarely a triangle is seen; zero where it is not.
-        normals: (Q, 3) unit, camera frame.
+        trust: (Q,) in [0, 1]: 1 seen frontally, 0 hidden or oblique.
+        normals: (Q, 3) unit normals, camera frame.
     """
 
     colours: np.ndarray
@@ -35,10 +35,10 @@ class Sight:
 
 @dataclass(frozen=True)
 class FaceImage:
-    """The image about the face.
+    """The face in an image.
 
     Attributes:
-        values: (h, w, 3) float32 display values 0 to 255, softened.
+        values: (h, w, 3) float32 display values 0 to 255, slightly blurred.
         camera: of this crop.
     """
 
@@ -46,19 +46,22 @@ class FaceImage:
     camera: Camera
 
     @classmethod
-    def of(cls, linear: np.ndarray, camera: Camera, skin_mm: np.ndarray, most_px: int):
-        """From a linear image (h, w, 3); the face reduced to `most_px`; ValueError if not in it."""
-        crop = Crop.around(camera, camera.project(skin_mm), _MARGIN, most_px)
+    def of(cls, linear: np.ndarray, camera: Camera, skin_mm: np.ndarray, most_px: int) -> FaceImage:
+        """The face `skin_mm` (S, 3) world in `linear` (h, w, 3), at most `most_px` a side.
+
+        Raises ValueError where the face is outside the image.
+        """
+        crop = FaceCrop.around(camera, camera.project(skin_mm), _MARGIN, most_px)
         return cls(cv2.GaussianBlur(crop.image(linear), (0, 0), 0.8), crop.camera)
 
     def colours(self, points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Display values (N, 3) at points (N, 3) in the world, and whether they are in it (N,)."""
+        """Display values (N, 3) at `points_mm` (N, 3) world, and whether they are inside (N,) bool."""
         pixels = self.camera.project(points_mm)
         inside = self.camera.in_image(pixels, 1.0)
         return sample_bilinear(self.values, pixels).astype(np.float64), inside
 
-    def sight(self, fine_mm: np.ndarray, topology: FineTopology) -> Sight:
-        """At the centres of the skin's triangles of a fine mesh (V', 3)."""
+    def observe(self, fine_mm: np.ndarray, topology: FineTopology) -> SkinObservation:
+        """Colours at the centres of the skin's triangles of `fine_mm` (V', 3), world."""
         own = fine_mm[topology.skin_ids]
         centres = own[topology.skin].mean(axis=1)
         normals = triangle_normals(own, topology.skin)
@@ -69,4 +72,4 @@ class FaceImage:
         facing = np.flatnonzero(trust > 0)
         caster = RayCaster(fine_mm, topology.triangles)
         trust[facing] *= caster.visible(self.camera, centres[facing], tolerance_mm=0.5)
-        return Sight(colours, trust, normals @ self.camera.rotation.T)
+        return SkinObservation(colours, trust, normals @ self.camera.rotation.T)

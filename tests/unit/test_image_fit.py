@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.unit.photometric_scene import LIGHT, dome, image_of, mesh_of, motion, take_start
-from vermilion.appearance.estimate import Sightings, estimate_appearance
+from tests.unit.image_fit_scene import LIGHT, dome, image_of, mesh_of, motion, take_start
+from vermilion.appearance.estimate import SampleObservations, estimate_appearance
 from vermilion.appearance.harmonics import harmonics, harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.appearance.samples import sample_skin
@@ -13,17 +13,18 @@ from vermilion.geometry.rotations import rotation_matrix
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.ablations import ablation_rows
-from vermilion.tracking.image_fit.choose_frames import choose_frames
-from vermilion.tracking.image_fit.frame_fit import FrameProblem, PhotometricSettings
-from vermilion.tracking.image_fit.join import join_frames
+from vermilion.tracking.image_fit.appearance_frames import choose_appearance_frames
+from vermilion.tracking.image_fit.chunk import FrameChunk, fit_frames
+from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
-from vermilion.tracking.image_fit.take import learn_appearance, refine_frames
-from vermilion.tracking.offsets import CorrectiveLayer, LayerSettings
-from vermilion.tracking.settings import FitSettings
+from vermilion.tracking.image_fit.smooth_over_time import smooth_over_time
+from vermilion.tracking.image_fit.take import learn_appearance
+from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
+from vermilion.tracking.settings import LandmarkFitSettings
 
 MODEL = dome()
 N_FRAMES = 6
-SETTINGS = PhotometricSettings(iterations=(4, 4, 6))
+SETTINGS = FrameFitSettings(iterations=(4, 4, 6))
 
 
 def unit_vectors(count, seed=1):
@@ -63,7 +64,7 @@ def test_light_and_albedo_are_told_apart_by_the_skin_that_has_one_colour():
     albedo[:60] = [0.5, 0.1, 0.1]  # lips
     colours = (albedo * irradiance(normals, LIGHT))[:, None]
     samples = SurfacePoints(np.zeros(count, dtype=np.int32), np.full((count, 3), 1 / 3))
-    seen = Sightings(colours, normals, np.ones((frames, count)))
+    seen = SampleObservations(colours, normals, np.ones((frames, count)))
     found = estimate_appearance(np.arange(frames), samples, seen, 0.5)
     ratio = irradiance(normals, found.light) / irradiance(normals, LIGHT)
     assert np.abs(ratio / ratio.mean(axis=(0, 1)) - 1).mean() < 0.02
@@ -102,8 +103,9 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
     face = start.face(samples)
     images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     problem = FrameProblem(face, appearance, SETTINGS, 0.5)
-    found = refine_frames(
-        start, np.ones(N_FRAMES, dtype=bool), lambda row: images[row], problem, 1.0
+    valid = np.ones(N_FRAMES, dtype=bool)
+    found = fit_frames(
+        FrameChunk(start, valid, appearance, face, lambda row: images[row], 1.0), problem
     )
     refined = take_positions(start, found["x"])
     before = np.linalg.norm(in_pixels(off) - in_pixels(truth), axis=2).mean()
@@ -127,9 +129,9 @@ def take_positions(start, x):
 def test_frames_that_are_not_tracked_keep_the_landmark_fit(scene):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
-    problem = FrameProblem(start.face(samples), appearance, SETTINGS, 0.5)
-    none = np.zeros(N_FRAMES, dtype=bool)
-    found = refine_frames(start, none, lambda row: None, problem, 1.0)
+    face, none = start.face(samples), np.zeros(N_FRAMES, dtype=bool)
+    chunk = FrameChunk(start, none, appearance, face, lambda row: None, 1.0)
+    found = fit_frames(chunk, FrameProblem(face, appearance, SETTINGS, 0.5))
     assert np.array_equal(found["x"], start.x) and not found["refined"].any()
 
 
@@ -153,7 +155,7 @@ def test_layer_follows_what_the_model_cannot_make(scene):
     face = start.face(samples)
     image = image_of(MODEL, mesh_of(MODEL, truth[0], bulge))
     view = start.view(0, image, face, 1.0, 3)
-    layer = CorrectiveLayer(MODEL, MODEL.neutral_mm, face, appearance, LayerSettings())
+    layer = OffsetSolver(MODEL, MODEL.neutral_mm, face, appearance, OffsetSettings())
     found = layer.solve(view)
     missed = np.linalg.norm(found - bulge, axis=1)
     assert near @ missed < 0.3 * near @ np.linalg.norm(bulge, axis=1)
@@ -170,17 +172,19 @@ def test_joined_frames_keep_steady_motion_and_lose_noise():
     noisy = steady + 0.02 * rng.normal(size=(n, p))
     matrices = np.tile(np.eye(p) * 4.0, (n, 1, 1))
     everything = np.ones(n, dtype=bool)
-    settings = FitSettings()
-    same = join_frames(matrices, 4.0 * steady, steady, everything, 30.0, settings)
+    settings = LandmarkFitSettings()
+    same = smooth_over_time(matrices, 4.0 * steady, steady, everything, 30.0, settings)
     assert np.abs(same - steady).max() < 1e-9
-    smooth = join_frames(matrices, 4.0 * noisy, noisy, everything, 30.0, settings)
+    smooth = smooth_over_time(matrices, 4.0 * noisy, noisy, everything, 30.0, settings)
     assert np.abs(smooth - steady)[:, 6:].mean() < 0.6 * np.abs(noisy - steady)[:, 6:].mean()
-    backwards = join_frames(matrices, 4.0 * noisy[::-1], noisy[::-1], everything, 30.0, settings)
+    backwards = smooth_over_time(
+        matrices, 4.0 * noisy[::-1], noisy[::-1], everything, 30.0, settings
+    )
     assert np.abs(backwards[::-1] - smooth).max() < 1e-6
     holes = everything.copy()
     holes[10] = False
     assert np.allclose(
-        join_frames(matrices, 4.0 * noisy, noisy, holes, 30.0, settings)[10], noisy[10]
+        smooth_over_time(matrices, 4.0 * noisy, noisy, holes, 30.0, settings)[10], noisy[10]
     )
 
 
@@ -189,10 +193,10 @@ def test_chosen_frames_are_well_fitted_and_differ():
     x[:, 6] = np.linspace(0, 1, 20)
     error, valid = np.full(20, 2.0), np.ones(20, dtype=bool)
     error[19], valid[0], error[5] = 9.0, False, 1.0
-    chosen = choose_frames(x, valid, error, 4)
+    chosen = choose_appearance_frames(x, valid, error, 4)
     assert 5 in chosen and 18 in chosen and 19 not in chosen and 0 not in chosen
     assert len(chosen) == 4
-    assert len(choose_frames(x, np.zeros(20, dtype=bool), error, 4)) == 0
+    assert len(choose_appearance_frames(x, np.zeros(20, dtype=bool), error, 4)) == 0
 
 
 def test_ablations_tell_frames_that_taught_the_appearance_from_others():

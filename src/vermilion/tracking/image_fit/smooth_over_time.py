@@ -1,31 +1,32 @@
-"""Frames that were refined one by one, joined: smooth over time as the landmark fit is."""
+"""Smoothing of frames that were fitted one by one, as the landmark fit smooths a take."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
-from vermilion.tracking.landmark_fit.expression import N_POSE, FitSettings
+from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
 
 
-def join_frames(
+def smooth_over_time(
     matrices: np.ndarray,
     rights: np.ndarray,
     start: np.ndarray,
     refined: np.ndarray,
     fps: float,
-    settings: FitSettings,
+    settings: LandmarkFitSettings,
 ) -> np.ndarray:
-    """Minimum (F, 6 + K) of the frames' quadratics and of squared second differences over time.
+    """Minimum (F, P) of the frames' quadratics plus squared second differences over time; P = 6 + K.
 
-    All frames at once and symmetric in time: it does not lag, and chunks do not show.
+    One solve over the whole take, symmetric in time: it does not lag and does not depend on chunks.
 
     Args:
-        matrices: (F, P, P) and rights (F, P): each frame's energy is x'Ax/2 - b'x.
-        start: (F, P) feasible, as each frame was refined by itself.
-        refined: (F,) bool; the others are held where they start, and nothing crosses them.
+        matrices: (F, P, P) A of each frame's quadratic x'Ax/2 - b'x.
+        rights: (F, P) b of each frame's quadratic.
+        start: (F, P) the fit of each frame by itself.
+        refined: (F,) bool; the other frames keep `start` and stop the smoothing.
         fps: frames a second.
-        settings: what accelerations are typical.
+        settings: typical accelerations.
     """
     n_params = start.shape[1]
     strength = settings.smoothness(n_params - N_POSE, fps)
