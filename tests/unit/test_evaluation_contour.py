@@ -74,10 +74,10 @@ def test_fitted_lips_lie_on_the_contours_and_stay_where_there_are_none(model):
     still = np.eye(3)[None], np.zeros((1, 3))
     take = CoarseTake(
         np.zeros(1, int), open_mm[None], model.triangles, model.neutral_mm, *still, np.zeros((1, 0)),
-        np.ones(1, bool), found,
+        np.ones(1, bool),
     )  # fmt: skip
     weights = 0.3 * (np.array(model.expression_names) == "jawOpen")[None]
-    fitted = tracker.track(take, weights)[0]
+    fitted = tracker.track(take, found, weights)[0]
     ring = lip_rings(model, 80)[0]
     before, after = (
         np.linalg.norm(camera.project(ring.points(mesh)) - found.outer_px[0], axis=1).mean()
@@ -91,5 +91,5 @@ def test_fitted_lips_lie_on_the_contours_and_stay_where_there_are_none(model):
     )
 
     nothing = np.zeros((1, 80), dtype=bool)
-    lost = replace(take, image=replace(found, outer_found=nothing, inner_found=nothing))
-    np.testing.assert_allclose(tracker.track(lost, weights)[0], open_mm, atol=1e-9)
+    lost = replace(found, outer_found=nothing, inner_found=nothing)
+    np.testing.assert_allclose(tracker.track(take, lost, weights)[0], open_mm, atol=1e-9)

@@ -61,7 +61,8 @@ def test_the_neutral_frame_is_corrected_to_the_accurate_neutral(model, pair):
     layers = known.predict(pair.features[None], pair.neutral_mm)[0]
     true = correction_layers(pair.coarse_mm, pair.accurate_mm, TRIANGLES[MASK])
     np.testing.assert_allclose(layers, true, atol=1e-5)
-    moved = known.displacements_mm(pair.features[None], pair.neutral_mm)[0]
+    mixture = np.append(known.mixture(pair.features[None], pair.neutral_mm)[0], 1.0)
+    moved = (mixture @ known.basis(pair.neutral_mm)[1]).reshape(-1, 3)
     np.testing.assert_allclose(moved, (pair.accurate_mm - pair.coarse_mm)[VERTICES], atol=1e-4)
     assert np.abs(model.predict(pair.features[None], pair.neutral_mm)[0] - true).max() > 0.05
 

@@ -57,13 +57,14 @@ class ContourTracker:
         self.outer = SurfacePoints.on_edges(ring.start, ring.end, ring.fraction, model.triangles)
         self.occluding = OccludingContour.of(model)
 
-    def track(self, take: CoarseTake, weights: np.ndarray) -> np.ndarray:
+    def track(self, take: CoarseTake, image: ImageContours, weights: np.ndarray) -> np.ndarray:
         """Meshes (F, V, 3) mm, world, fitted to the contours in the take's images.
 
         A frame with too few contour points keeps its coarse mesh.
 
         Args:
-            take: the base track with its image contours.
+            take: the base track.
+            image: contours in the images of the same frames.
             weights: (F, all expressions of the model) of the base track.
         """
         result = head_from_world(take.coarse_mm, take.rotation, take.translation_mm)
@@ -74,8 +75,8 @@ class ContourTracker:
                 np.concatenate([-now, np.zeros(of_shapes)]),
                 np.append(1.0 - now, np.ones(of_shapes)),
             )
-            frame = _FrameView(take.image.camera, take.rotation[f], take.translation_mm[f])
-            fitted = self._fit(frame, result[f], bounds, take.image, f)
+            frame = _FrameView(image.camera, take.rotation[f], take.translation_mm[f])
+            fitted = self._fit(frame, result[f], bounds, image, f)
             result[f] += np.tensordot(fitted, self.displacements_mm, 1)
         return world_from_head(result, take.rotation, take.translation_mm)
 

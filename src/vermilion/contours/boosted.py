@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -53,7 +53,7 @@ class BoostedDetector(ContourDetector):
 
     def arrays(self) -> dict[str, np.ndarray | float]:
         """All that the detector is, by name."""
-        arrays = {
+        arrays: dict[str, np.ndarray | float] = {
             "channels": np.array(CHANNELS),
             "interocular_size_px": self.interocular_size_px,
             "margin": self.margin,
@@ -71,7 +71,7 @@ class BoostedDetector(ContourDetector):
         forests = {}
         for name in CONTOURS:
             pool = FeaturePool(*(arrays[f"{name}/{part}"] for part in _POOL))
-            trees = {part: arrays[f"{name}/{part}"] for part in _TREES}
+            trees: dict[str, Any] = {part: arrays[f"{name}/{part}"] for part in _TREES}
             forests[name] = Forest(pool, **trees | {"prior": float(trees["prior"])})
         sizes = ("interocular_size_px", "margin", "smoothing_px")
         return cls(forests, *(float(arrays[size]) for size in sizes))

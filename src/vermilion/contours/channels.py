@@ -31,7 +31,7 @@ def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
     """
     luminance = linear_rgb @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
     gain = 0.18 / max(float(np.median(luminance)), 1e-4)
-    lab = cv2.cvtColor(linear_to_srgb(linear_rgb * gain), cv2.COLOR_RGB2Lab)
+    lab: np.ndarray = cv2.cvtColor(linear_to_srgb(linear_rgb * gain), cv2.COLOR_RGB2Lab)
     lightness, red = lab[..., 0] / 100.0, lab[..., 1] / 128.0
     channels = [lightness, 0.5 + lab[..., 1] / 128.0, 0.5 + lab[..., 2] / 128.0]
     magnitudes, orientations, blobs = [], [], []

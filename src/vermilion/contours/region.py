@@ -54,7 +54,8 @@ class MouthRegion:
         affine = self.image_from_region.copy()
         low, high = self._window(image.shape)
         affine[:, 2] -= low
-        source = np.ascontiguousarray(image[low[1] : high[1], low[0] : high[0]], dtype=np.float32)
+        part = image[low[1] : high[1], low[0] : high[0]]
+        source: np.ndarray = np.ascontiguousarray(part, dtype=np.float32)
         if self.scale > 1.0:  # the image has more detail than the region can hold
             source = cv2.GaussianBlur(source, (0, 0), 0.5 * np.sqrt(self.scale**2 - 0.75))
         return cv2.warpAffine(

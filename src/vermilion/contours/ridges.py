@@ -7,7 +7,7 @@ is drawn about it. What is lip-coloured is learnt in each frame by itself.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -184,7 +184,7 @@ class RidgeDetector(ContourDetector):
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
         """Of what `arrays` gave. Raises KeyError where something is missing."""
-        values = {field.name: arrays[field.name] for field in fields(cls)}
+        values: dict[str, Any] = {field.name: arrays[field.name] for field in fields(cls)}
         return cls(**{k: float(v) if np.ndim(v) == 0 else v for k, v in values.items()})
 
 

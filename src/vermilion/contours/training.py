@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import cv2
 import numpy as np
@@ -57,7 +58,7 @@ class TrainingSettings:
     @classmethod
     def of(cls, section) -> TrainingSettings:
         """From a section of the configuration with the same names."""
-        given = {f.name: getattr(section, f.name, None) for f in fields(cls)}
+        given: dict[str, Any] = {f.name: getattr(section, f.name, None) for f in fields(cls)}
         trees = section.boosting.model_dump()
         boosting = BoostingSettings(n_trees=trees.pop("trees"), seed=section.seed, **trees)
         return cls(**given | {"n_features": section.features, "boosting": boosting})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -98,15 +99,15 @@ class CoarseTake:
             reach: neighbours to either side that are read too, where the files have them.
         """
         near = frames_around(frames, frames_of(coarse), reach)
-        measured = read_chunks(features, near, ["features", *IMAGE_ARRAYS])
-        return cls.of(face, fit, neutral_mm, near, read_frames(coarse, near), measured)
+        measured = read_chunks(features, near.tolist(), ["features", *IMAGE_ARRAYS])
+        return cls.of(face, fit, neutral_mm, near, read_frames(coarse, near.tolist()), measured)
 
     def __len__(self) -> int:
         return len(self.frames)
 
     def __getitem__(self, rows: np.ndarray | slice) -> CoarseTake:
         """The same of some frames, by rows or (F,) bool."""
-        given = {name: getattr(self, name) for name in _PER_FRAME}
+        given: dict[str, Any] = {name: getattr(self, name) for name in _PER_FRAME}
         return replace(self, **{n: v if v is None else v[rows] for n, v in given.items()})
 
     def usable(self, inputs: np.ndarray) -> np.ndarray:

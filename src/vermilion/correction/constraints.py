@@ -50,7 +50,7 @@ class LinearConstraints:
                  for f in fields(self)]  # fmt: skip
         return LinearConstraints(*(np.concatenate(pair) for pair in pairs))
 
-    def __getitem__(self, chosen: np.ndarray) -> LinearConstraints:
+    def __getitem__(self, chosen: np.ndarray | slice) -> LinearConstraints:
         return LinearConstraints(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     def evaluate(self, vertices_mm: np.ndarray) -> np.ndarray:

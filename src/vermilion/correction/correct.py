@@ -10,6 +10,7 @@ correct several stretches of one person with one factorisation, use one `Correct
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,8 @@ class CorrectionSettings:
     def of(cls, section: CorrectionConfig, fps: float) -> CorrectionSettings:
         """From the section `correction` of the configuration, for a take of `fps` frames a second."""
         image = ImageAgreementSettings(**section.image.model_dump())
-        return cls(**section.integration.at(fps), image=image)
+        integration: dict[str, Any] = section.integration.at(fps)
+        return cls(**integration, image=image)
 
     def as_in_the_paper(self) -> CorrectionSettings:
         """Without the image, which Lips16 leaves to future work, each frame by itself."""
@@ -150,8 +152,8 @@ def _in_world(
 ) -> np.ndarray:
     """The coarse meshes (F, V, 3), those at `rows` (F,) bool replaced by corrected ones, head frame."""
     corrected_mm, usable = np.array(take.coarse_mm, dtype=np.float64), take[rows]
-    if agreement is None:
+    if agreement is None or usable.image is None:
         corrected_mm[rows] = world_from_head(head_mm, usable.rotation, usable.translation_mm)
     else:
-        corrected_mm[rows] = agreement.fit(head_mm, usable)
+        corrected_mm[rows] = agreement.fit(head_mm, usable, usable.image)
     return corrected_mm

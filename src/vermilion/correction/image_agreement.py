@@ -12,6 +12,7 @@ import numpy as np
 
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
+from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_constraints import (
     LipSamples,
@@ -95,22 +96,24 @@ class ImageAgreement:
         self._lips = np.intersect1d(lips, integrator.free)
         self._solver = ConstraintSolver(integrator, np.union1d(lips, self._crossings.vertices))
 
-    def fit(self, head_mm: np.ndarray, take: CoarseTake) -> np.ndarray:
+    def fit(self, head_mm: np.ndarray, take: CoarseTake, image: ImageContours) -> np.ndarray:
         """Meshes that agree with their images.
 
         Args:
             head_mm: (F, V, 3) corrected meshes, head frame, as the integrator leaves them.
-            take: of the same frames, with their image contours.
+            take, image: of the same frames.
 
         Returns:
             (F, V, 3), world, mm.
         """
-        image, rotation, translation_mm = take.image, take.rotation, take.translation_mm
+        rotation, translation_mm = take.rotation, take.translation_mm
         lines, frames = image.lines(), range(len(take))
         unit_px = np.array([interocular_px(v[self._eyes], image.camera) for v in take.coarse_mm])
         seen = [self._seen(head_mm[f], rotation[f], translation_mm[f], image, f) for f in frames]
         if self.settings.repose and seen:
-            rotation, translation_mm = self._reposed(head_mm, take, lines, seen, unit_px)
+            rotation, translation_mm = self._reposed(
+                head_mm, take, image.camera, lines, seen, unit_px
+            )
         head_mm = np.array(head_mm)
         found = [
             self._constrained(
@@ -124,7 +127,7 @@ class ImageAgreement:
             head_mm[:, self._free] += self._solver.displacements(constraints, forces)
         return world_from_head(head_mm, rotation, translation_mm)
 
-    def _reposed(self, head_mm, take, lines, seen, unit_px):
+    def _reposed(self, head_mm, take, camera, lines, seen, unit_px):
         """`world_from_head` after the corrected heads are laid on the image."""
         turn = np.swapaxes(take.rotation, 1, 2)
         pivot = self._pivot @ turn + take.translation_mm
@@ -133,9 +136,9 @@ class ImageAgreement:
         )
         motion = repose_motion(
             world_from_head(head_mm[:, self._anchors], take.rotation, take.translation_mm),
-            take.image.camera.project(take.coarse_mm[:, self._anchors]),
+            camera.project(take.coarse_mm[:, self._anchors]),
             world_from_head(samples, take.rotation, take.translation_mm),
-            lines, pivot, unit_px, take.image.camera,
+            lines, pivot, unit_px, camera,
         )  # fmt: skip
         known = lines[2].mean(axis=1) >= _LEAST_KNOWN
         motion = smoothed_motion(motion, known, take.frames, self.settings.repose_frames)
@@ -190,7 +193,8 @@ class ImageAgreement:
         Should contours press the lips together so that no set is enough, they count less and less; the
         least deep result stands where nothing helps.
         """
-        ids, now, least, best = self._crossings.vertices, np.array(vertices), np.inf, None
+        ids, now, least = self._crossings.vertices, np.array(vertices), np.inf
+        best = constraints, np.zeros(len(constraints))
         for counts in _CONTOURS_COUNT:
             both = replace(constraints, compliance=constraints.compliance / counts)
             for _ in range(_ROUNDS):

@@ -61,7 +61,8 @@ class ImageContours:
         """(points (F, 2n, 2) px, unit normals (F, 2n, 2), known (F, 2n) bool), outer ring first."""
         outer = _ring_lines(self.outer_px, self.outer_found)
         inner = _ring_lines(self.inner_px, self.inner_found)
-        return tuple(np.concatenate(parts, axis=1) for parts in zip(outer, inner, strict=True))
+        points, normals, known = (np.concatenate(p, axis=1) for p in zip(outer, inner, strict=True))
+        return points, normals, known
 
 
 def _ring_lines(

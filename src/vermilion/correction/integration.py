@@ -104,23 +104,26 @@ class LayerIntegrator:
             raise ValueError(
                 f"layers must be ({len(coarse)}, {len(self.mask)}, 9), got {layers.shape}"
             )
-        if len(self.places) and np.shape(displacement_mm) != (len(coarse), len(self._local), 3):
+        moved = np.asarray(displacement_mm)
+        if len(self.places) and moved.shape != (len(coarse), len(self._local), 3):
             raise ValueError(
                 f"displacement_mm must be ({len(coarse)}, {len(self._local)}, 3) with detail_mm, "
-                f"got {np.shape(displacement_mm)}"
+                f"got {moved.shape}"
             )
         frames_last = np.zeros((len(self.mask), 9, LANES))
 
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = layers[part]
             frames_last[..., : len(given)] = np.transpose(given, (1, 2, 0))
-            accumulate(*self._triangles(points), frames_last, *_series(points.dtype), right)
+            accumulate(  # type: ignore[call-arg]  # the stub of a dispatcher takes no arguments
+                *self._triangles(points), frames_last, *_series(points.dtype), right
+            )
             if len(self.places):
-                wanted = np.transpose(displacement_mm[part][:, self.places], (1, 2, 0))
+                wanted = np.transpose(moved[part][:, self.places], (1, 2, 0))
                 rows = self._row[self.places]
                 right[rows, :, : len(given)] += self.place_weight[:, None, None] * wanted
 
-        return self._corrected(coarse, add_to, np.float64)
+        return self._corrected(coarse, add_to, np.dtype(np.float64))
 
     def integrate_mixture(
         self,

@@ -47,12 +47,12 @@ class LipSamples:
             points = ring.points(neutral_mm)
             steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
             lengths.append(np.full(len(ring), steps.mean()))
-        places = (
+        start, end, fraction = (
             np.concatenate([getattr(ring, name) for ring in (outer, inner)])
             for name in ("start", "end", "fraction")
         )
-        points = SurfacePoints.on_edges(*places, triangles)
-        return cls(points, triangles, np.concatenate(lengths))
+        samples = SurfacePoints.on_edges(start, end, fraction, triangles)
+        return cls(samples, triangles, np.concatenate(lengths))
 
 
 def contour_constraints(

@@ -36,10 +36,7 @@ class Crossings:
     depth_mm: np.ndarray
 
     def __getitem__(self, chosen: np.ndarray) -> Crossings:
-        return Crossings(
-            self.inside[chosen], self.triangle[chosen], self.barycentric[chosen],
-            self.normal[chosen], self.depth_mm[chosen],
-        )  # fmt: skip
+        return Crossings(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     @property
     def deepest_mm(self) -> float:
@@ -89,8 +86,8 @@ def _both_ways(triangles: np.ndarray) -> np.ndarray:
 def _entering(vertices: np.ndarray, edges: np.ndarray, triangles: np.ndarray) -> Crossings:
     """Edges (E, 2) from outside through the front of a triangle (T, 3)."""
     if len(edges) == 0 or len(triangles) == 0:
-        nothing = np.zeros(0, dtype=np.int64)
-        return Crossings(nothing, *(np.zeros((0, 3), t) for t in (np.int64, float, float)), nothing)
+        ids, places = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
+        return Crossings(ids[:, 0], ids, places, places, places[:, 0])
     along = vertices[edges[:, 1]] - vertices[edges[:, 0]]
     length = np.linalg.norm(along, axis=1)
     directions = along / np.maximum(length, 1e-9)[:, None]

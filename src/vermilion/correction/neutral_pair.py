@@ -12,6 +12,7 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,14 +48,13 @@ class NeutralPair:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(path, **{f.name: np.asarray(getattr(self, f.name)) for f in fields(self)})
+        write_arrays(path, **vars(self))
 
     @classmethod
     def load(cls, path: str | Path) -> NeutralPair:
         """Read what `save` wrote."""
-        arrays = read_arrays(path, "neutral pair", [f.name for f in fields(cls)])
-        texts = {name: str(arrays[name]) for name in ("subject", "take", "reason")}
-        return cls(**{**arrays, **texts})
+        arrays: dict[str, Any] = read_arrays(path, "neutral pair", [f.name for f in fields(cls)])
+        return cls(**arrays | {name: str(arrays[name]) for name in ("subject", "take", "reason")})
 
 
 def with_known_neutrals(
@@ -91,7 +91,9 @@ def with_known_neutrals(
         _check(model, pair)
     model.check_topology(triangles)
     own = told[-1]
-    shift = own.features - model.neutral_features if len(model.shifts) else 0.0
+    shift = np.zeros_like(own.features)
+    if len(model.shifts):
+        shift = own.features - model.neutral_features
     estimator, before = copy.copy(model.estimator), model.estimator.bias_of(person)
     known = [] if person is None else [before]
     for pair in told:

@@ -52,8 +52,7 @@ def bind_vertices(
 
     vertices = registered.vertices_mm
     normals = vertex_normals(vertices, registered.triangles)
-    found = search(np.arange(len(vertices)), vertices, normals)
-    found = found.restricted(found.distance_mm <= max_distance_mm)
+    found = search(np.arange(len(vertices)), vertices, normals).within(max_distance_mm)
     found = _without_folds(found, registered.triangles, accurate, search, rounds)
     distance = np.linalg.norm(
         found.sample(accurate.vertices_mm, accurate.triangles) - vertices, axis=1

@@ -111,11 +111,12 @@ class LipDatabase:
 
         def gathered(name: str, width: int, dtype: type = np.float32) -> np.ndarray:
             """(total, width) of a data set's rows, read take by take into one array."""
-            result, first = np.empty((total, width), dtype=dtype), 0
-            for group, part in zip(groups, rows, strict=True):
+            result: np.ndarray = np.empty((total, width), dtype=dtype)
+            for group, part, end in zip(
+                groups, rows, np.cumsum([len(r) for r in rows]), strict=True
+            ):
                 if len(part):
-                    result[first : first + len(part)] = group[name][part].reshape(len(part), -1)
-                first += len(part)
+                    result[end - len(part) : end] = group[name][part].reshape(len(part), -1)
             return result
 
         trained = sorted({s for (s, _), part in zip(chosen, rows, strict=True) if len(part)})

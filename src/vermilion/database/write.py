@@ -80,13 +80,13 @@ def write_database(
         _dataset(file, "mask/area_mm2", area.astype(np.float64))
         _dataset(file, "features/names", np.array(list(feature_names), dtype="S"))
         _dataset(file, "layers/names", np.array(LAYER_NUMBERS, dtype="S"))
-        for entry in subjects:
-            _dataset(file, f"subjects/{entry.subject}/neutral_mm", entry.neutral_mm)
-            if entry.neutral_features is not None:
-                values = entry.neutral_features.astype(np.float32)
-                _dataset(file, f"subjects/{entry.subject}/neutral_features", values)
-        for entry in takes:
-            _write_take(file, entry, columns[entry.subject], len(feature_names), compression)
+        for person in subjects:
+            _dataset(file, f"subjects/{person.subject}/neutral_mm", person.neutral_mm)
+            if person.neutral_features is not None:
+                values = person.neutral_features.astype(np.float32)
+                _dataset(file, f"subjects/{person.subject}/neutral_features", values)
+        for take in takes:
+            _write_take(file, take, columns[take.subject], len(feature_names), compression)
 
 
 def _write_take(

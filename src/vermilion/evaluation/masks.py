@@ -87,4 +87,4 @@ def mask_on(
     """
     finite = np.isfinite(mask_vertices_mm[mask_triangles]).all(axis=(1, 2))
     surface = Surface(np.nan_to_num(mask_vertices_mm), mask_triangles[finite])
-    return surface.closest(vertices_mm[triangles].mean(axis=1)).distance_mm <= reach_mm
+    return surface.closest(vertices_mm[triangles].mean(axis=1)).within(reach_mm).bound

@@ -11,29 +11,6 @@ BIN_MM = 0.01
 N_BINS = 3000
 
 
-def weighted_mean(values: np.ndarray, weights: np.ndarray) -> float:
-    """Mean of (..., V) values with (V,) weights; NaN values do not count."""
-    weights = np.broadcast_to(weights, values.shape) * np.isfinite(values)
-    return float((np.nan_to_num(values) * weights).sum() / weights.sum())
-
-
-def weighted_std(values: np.ndarray, weights: np.ndarray) -> float:
-    """Standard deviation of (..., V) values with (V,) weights; NaN values do not count."""
-    mean = weighted_mean(values, weights)
-    return float(np.sqrt(weighted_mean((values - mean) ** 2, weights)))
-
-
-def weighted_quantile(values: np.ndarray, weights: np.ndarray, q: float) -> float:
-    """Smallest value below which lies the share `q` of the weight; NaN values do not count."""
-    weights = np.broadcast_to(weights, values.shape).ravel()
-    values = values.ravel()
-    chosen = np.isfinite(values) & (weights > 0)
-    order = np.argsort(values[chosen], kind="stable")
-    cumulative = np.cumsum(weights[chosen][order])
-    place = np.searchsorted(cumulative, q * cumulative[-1])
-    return float(values[chosen][order][min(place, len(order) - 1)])
-
-
 def histograms(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Weight in each bin of `BIN_MM`, a row a frame: (F, V) mm, (V,) -> (F, N_BINS).
 

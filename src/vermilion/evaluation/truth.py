@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +49,7 @@ def read_truth(
     return sequence[rows], corners
 
 
-def read_curves(path: str | Path, rows: Sequence[int], **place) -> list[dict[str, float]]:
+def read_curves(path: str | Path, rows: Iterable[int], **place) -> list[dict[str, float]]:
     """Expression weights of the frames at `rows` of the take, a dict each."""
     try:
         curves = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -62,7 +62,7 @@ def read_curves(path: str | Path, rows: Sequence[int], **place) -> list[dict[str
     return [curves[int(row)] for row in rows]
 
 
-def _check_length(found: int, rows: Sequence[int], path: str | Path, place: dict) -> None:
+def _check_length(found: int, rows: Iterable[int], path: str | Path, place: dict) -> None:
     wanted = max((int(row) for row in rows), default=-1) + 1
     if found < wanted:
         raise InputError(

@@ -151,7 +151,7 @@ def overlay_image(
         triangles: (T, 3) to draw; colours: (V, 3) in [0, 1].
         caption: written into the first panel (take, frame).
     """
-    rows = []
+    rows: list[np.ndarray] = []
     for crop in crops:
         original, near = crop.of_image(image), crop.of_camera(camera)
         panels, names = [original], [caption]
@@ -182,7 +182,7 @@ def join_videos(path: str | Path, parts: Sequence[str | Path]) -> None:
                     stream.time_base = given.time_base
                 end = 0
                 for packet in source.demux(given):
-                    if packet.dts is None:
+                    if packet.dts is None or packet.pts is None:
                         continue
                     packet.pts += offset
                     packet.dts += offset

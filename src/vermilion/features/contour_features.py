@@ -75,20 +75,20 @@ class ContourSampler:
                 distances are in the head frame, where a turn of the head is undone (Lips16 7).
                 None: they are in the image (Lips16 5.1).
         """
-        unit_px = interocular_px(vertices_mm[self.eye_corners], camera)
+        rotation, translation = pose or (np.eye(3), np.zeros(3))
+
+        def to_pixels(points: np.ndarray) -> np.ndarray:
+            return points if pose is None else camera.project(points @ rotation.T + translation)
+
+        unit = unit_px = interocular_px(vertices_mm[self.eye_corners], camera)
         model_outer, model_inner = (r.points(vertices_mm) for r in (self.outer, self.inner))
         if pose is None:
-            unit, to_pixels = unit_px, np.asarray
             model_outer, model_inner = camera.project(model_outer), camera.project(model_inner)
         else:
-            rotation, translation = pose
             unit = float(np.linalg.norm(np.diff(vertices_mm[self.eye_corners], axis=0)))
             model_outer, model_inner = (
                 (points - translation) @ rotation for points in (model_outer, model_inner)
             )
-
-            def to_pixels(points):
-                return camera.project(points @ rotation.T + translation)
 
         outer, inner = model_outer, model_inner
         outer_found = inner_found = np.zeros(len(outer), dtype=bool)
@@ -101,7 +101,10 @@ class ContourSampler:
             inner, inner_found = found.points, found.found
         return FrameContours(
             contour_distances(outer, inner, unit),
-            *(to_pixels(points) for points in (outer, inner, model_outer, model_inner)),
+            to_pixels(outer),
+            to_pixels(inner),
+            to_pixels(model_outer),
+            to_pixels(model_inner),
             outer_found,
             inner_found,
             unit_px,

@@ -110,7 +110,7 @@ def find_outer(
     places = np.arange(-settings.outward, settings.inward + 1e-9, settings.step)
     lines, depth = ring[:, None] + places[:, None] * unit * normals[:, None], arch_depth(ring)
     lines[..., 2:] += depth(lines) - depth(ring)[:, None]
-    profile = sample_bilinear(np.float32(likelihood), to_pixels(lines), "zero").astype(np.float64)
+    profile = _profile(likelihood, to_pixels(lines))
     cost = -np.log(profile + settings.floor)
     cost += settings.model_weight * (places / settings.inward) ** 2
     chosen = cheapest_ring(cost, step_cost(ring / unit, settings.step, settings.smooth_weight))
@@ -152,7 +152,7 @@ def find_inner(
     lines[..., 2:] = (
         depth(lines) + from_outer[:, None] * (1 - passed) + from_inner[:, None] * passed
     )
-    profile = sample_bilinear(np.float32(likelihood), to_pixels(lines), "zero").astype(np.float64)
+    profile = _profile(likelihood, to_pixels(lines))
     ridge = round(0.012 / settings.step)  # half the width of a ridge does not count as before
     before = np.cumsum(-np.log1p(-np.minimum(profile, 0.98)), axis=1) * (settings.step / 0.02)
     before = np.pad(before, ((0, 0), (ridge, 0)))[:, : len(places)]
@@ -160,6 +160,11 @@ def find_inner(
     cost += settings.model_weight * _distance_cost((places - expected[:, None]) / settings.inward)
     chosen = cheapest_ring(cost, step_cost(outer / unit, settings.step, settings.smooth_weight))
     return _refined(profile, places, chosen, lines, settings)
+
+
+def _profile(likelihood: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Likelihood (n, m) float64 at `pixels` (n, m, 2); 0 outside the map (h, w)."""
+    return sample_bilinear(likelihood.astype(np.float32), pixels, "zero").astype(np.float64)
 
 
 def _distance_cost(reaches: np.ndarray) -> np.ndarray:

@@ -89,6 +89,15 @@ class SurfacePoints:
             distance_mm=None if distance is None else np.where(kept, distance, np.inf),
         )
 
+    def within(self, reach_mm: float) -> SurfacePoints:
+        """The same points, unbound where a search found them farther than `reach_mm` from the query.
+
+        Raises ValueError for points that no search found.
+        """
+        if self.distance_mm is None:
+            raise ValueError("points without a distance: give those of Surface.closest")
+        return self.restricted(self.distance_mm <= reach_mm)
+
     def corners(self, triangles: np.ndarray) -> np.ndarray:
         """Ids (N, 3) of the vertices between which the points lie, by the mesh's triangles (T, 3).
 

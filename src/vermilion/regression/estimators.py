@@ -40,20 +40,10 @@ class RBFNetwork(LinearOutputs):
         self.prototype_stride = prototype_stride
         self.prototype_minimum = prototype_minimum
 
-    def _choose(
-        self,
-        scaled: np.ndarray,
-        sequences: np.ndarray | None,
-        prototypes: np.ndarray | None = None,
-    ) -> None:
-        """`prototypes`: (P,) rows to use in place of the temporal sampling."""
-        if prototypes is None:
-            prototypes = temporal_prototypes(
-                np.zeros(len(scaled)) if sequences is None else sequences,
-                self.prototype_stride,
-                self.prototype_minimum,
-            )
-        self.prototypes_ = scaled[prototypes]
+    def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None) -> None:
+        labels = np.zeros(len(scaled)) if sequences is None else sequences
+        rows = temporal_prototypes(labels, self.prototype_stride, self.prototype_minimum)
+        self.prototypes_ = scaled[rows]
 
     def _design(self, scaled: np.ndarray) -> np.ndarray:
         return gaussian_activations(scaled, self.prototypes_, self.beta)

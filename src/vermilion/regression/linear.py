@@ -61,7 +61,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         self.equalise = equalise
         self.basis_error = basis_error
 
-    def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None, **chosen) -> None:
+    def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None) -> None:
         """Fit what the design needs to know of the scaled features (F, M)."""
 
     def _design(self, scaled: np.ndarray) -> np.ndarray:
@@ -84,7 +84,6 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         sequences: np.ndarray | None = None,
         persons: np.ndarray | None = None,
         n_layers: int | None = None,
-        **chosen,
     ) -> Self:
         """Fit on features (F, M) and targets (F, K).
 
@@ -94,14 +93,13 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
                 the paper's single bias.
             n_layers: the first so many targets are layers, the others displacements: what people have
                 in common is judged of each kind by itself. None: all are of one kind.
-            chosen: what the subclass lets the caller choose (`fit_inputs`).
         """
         if targets.ndim != 2 or len(features) != len(targets):
             raise ValueError(
                 "features and targets must be (F, M) and (F, K), "
                 f"got {np.shape(features)} and {targets.shape}"
             )
-        design = self.fit_inputs(features, sequences, **chosen)
+        design = self.fit_inputs(features, sequences)
         labels = np.zeros(len(design), dtype=np.int64) if persons is None else persons
         weights, biases = ridge_weights(design, targets, self.alpha, persons=labels)
         self.coefficients_, self.basis_ = layer_basis(design, weights, self.alpha, self.basis_error)
@@ -119,9 +117,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
             ).astype(weights.dtype)
         return self
 
-    def fit_inputs(
-        self, features: np.ndarray, sequences: np.ndarray | None = None, **chosen
-    ) -> np.ndarray:
+    def fit_inputs(self, features: np.ndarray, sequences: np.ndarray | None = None) -> np.ndarray:
         """Design (F, P) of `features` (F, M) in `sequences` (F,): fits all but the weights."""
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2:
@@ -132,7 +128,7 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         )
         scaled = self.scaled(features)
         self.feature_low_, self.feature_high_ = feature_range(scaled, self.reach)
-        self._choose(scaled, sequences, **chosen)
+        self._choose(scaled, sequences)
         design = self._design(scaled)
         self.mean_activation_ = design.mean(axis=0)
         self.deviation_ = uncertain_directions(design - self.mean_activation_, self.alpha)
@@ -164,11 +160,6 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
     def bias_of(self, person: int | None) -> np.ndarray:
         """(K,) of a person of the training, or of anybody else (None)."""
         return self.bias_ if person is None else self.person_biases_[person]
-
-    @property
-    def weights_(self) -> np.ndarray:
-        """Weights (P, K) of the design."""
-        return self.coefficients_ @ self.basis_
 
 
 def layer_basis(

@@ -20,6 +20,12 @@ FORMAT = "vermilion-regressor"
 FORMAT_VERSION = 4
 #: Displacement (mm) that weighs as much as 1 in a layer (rad), so that one basis serves both.
 DISPLACEMENT_UNIT_MM = 30.0
+#: What the numbers of a file are measured in, for its readers.
+UNITS = {
+    "unit_displacements": f"{DISPLACEMENT_UNIT_MM:g} mm",
+    "unit_features": "see feature_names",
+    "unit_layers": "rad, 1",
+}
 #: Coarse neutrals this near (RMS) are one person's: they come from one identity.npz.
 SAME_PERSON_MM = 0.05
 ESTIMATORS = {"rbf": RBFNetwork, "affine": AffineRegressor, "kernel": KernelRegressor}
@@ -45,7 +51,6 @@ class LipModel:
             have the same; none for features as they are.
         neutral_features: (M,) what all neutral frames have then: their mean in the training.
         novelty_limit: `novelty` above which a frame is outside the training's span.
-        units: what the features and layers are measured in.
     """
 
     name: str
@@ -60,18 +65,6 @@ class LipModel:
     shifts: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     neutral_features: np.ndarray = field(default_factory=lambda: np.zeros(0))
     novelty_limit: float = np.inf
-    units: dict[str, str] = field(
-        default_factory=lambda: {
-            "layers": "rad, 1",
-            "displacements": f"{DISPLACEMENT_UNIT_MM:g} mm",
-            "features": "see feature_names",
-        }
-    )
-
-    @property
-    def training_subjects(self) -> tuple[str, ...]:
-        """Subjects who have training frames, sorted."""
-        return tuple(sorted({name.split("/")[0] for name in self.training_frames}))
 
     def person_of(self, neutral_mm: np.ndarray | None) -> int | None:
         """Which person of the training has the coarse `neutral_mm` (V, 3), head frame; None for nobody."""
@@ -94,15 +87,6 @@ class LipModel:
         person = self.person_of(neutral_mm)
         flat = self.estimator.predict(self._chosen(features, person), person)
         return flat[:, : 9 * len(self.mask)].reshape(len(features), -1, 9)
-
-    def displacements_mm(
-        self, features: np.ndarray, neutral_mm: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Displacements (F, N, 3) mm from C, head frame, of `features` (F, M); `neutral_mm` as in `predict`."""
-        person = self.person_of(neutral_mm)
-        flat = self.estimator.predict(self._chosen(features, person), person)
-        places = flat[:, 9 * len(self.mask) :].reshape(len(features), -1, 3)
-        return DISPLACEMENT_UNIT_MM * places
 
     def mixture(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
         """Coefficients (F, R) of the basis, of `features` (F, M); `neutral_mm` as in `predict`."""
@@ -156,7 +140,7 @@ def save_model(path: str | Path, model: LipModel) -> None:
             estimator=kind,
             topology_sha256=model.topology,
             novelty_limit=model.novelty_limit,
-            **{f"unit_{name}": unit for name, unit in sorted(model.units.items())},
+            **UNITS,
         )
         for setting in _settings(ESTIMATORS[kind]):
             file.attrs[setting] = getattr(model.estimator, setting)
@@ -229,7 +213,6 @@ def _read(file: h5py.File) -> LipModel:
         training.update({f"{subject}/{take}": frames[:] for take, frames in takes.items()})
     persons = file["persons"].items() if "persons" in file else ()
     persons = sorted(persons, key=lambda item: int(item[1].attrs["index"]))
-    units = {k.removeprefix("unit_"): str(v) for k, v in file.attrs.items() if k[:5] == "unit_"}
     return LipModel(
         name=str(file.attrs["name"]),
         estimator=estimator,
@@ -243,7 +226,6 @@ def _read(file: h5py.File) -> LipModel:
         shifts=file["features/shifts"][:],
         neutral_features=file["features/neutral"][:],
         novelty_limit=float(file.attrs["novelty_limit"]),
-        units=units,
     )
 
 

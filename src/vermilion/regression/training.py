@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -56,7 +56,7 @@ class Selection:
 
     def estimator(self, kind: Estimator, groups: Sequence[str] | None) -> LinearOutputs:
         """An estimator that lacks only alpha and beta."""
-        shared = {
+        shared: dict[str, Any] = {
             "feature_groups": groups,
             "reach": self.reach,
             "fade": self.fade,
@@ -78,14 +78,13 @@ class Selection:
         """Lips16 5.2 to the letter: one bias, features as they are, no limit, the least error."""
         return replace(self, bias="shared", anchor="none", reach=1e9, choice="least")
 
-    def grid(self, kind: Estimator) -> dict[str, list[float] | None]:
-        """`alphas` and `betas` to try, ascending."""
-        alphas, betas = {
-            "rbf": (self.alphas, self.betas),
-            "affine": (self.affine_alphas, None),
-            "kernel": (self.kernel_alphas, self.kernel_betas),
-        }[kind]
-        return {"alphas": sorted(alphas), "betas": None if betas is None else sorted(betas)}
+    def grid(self, kind: Estimator) -> tuple[list[float], list[float] | None]:
+        """Alphas and betas to try, ascending; no betas for an estimator without."""
+        if kind == "affine":
+            return sorted(self.affine_alphas), None
+        if kind == "kernel":
+            return sorted(self.kernel_alphas), sorted(self.kernel_betas)
+        return sorted(self.alphas), sorted(self.betas)
 
 
 def feature_group(name: str) -> str:
@@ -137,9 +136,10 @@ def train(
     by_person = group == "GR" and len(np.unique(data.persons)) >= LEAST_PEOPLE
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
     weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
+    alphas, betas = selection.grid(kind)
     curve = cross_validate(
         estimator, features, target_gram(data.layers, weights), data.sequences,
-        data.persons if by_person else clips, **selection.grid(kind), n_folds=selection.folds,
+        data.persons if by_person else clips, alphas=alphas, betas=betas, n_folds=selection.folds,
         persons=persons,
     )  # fmt: skip
     estimator.set_params(**curve.parameters(selection.choice))
@@ -178,7 +178,7 @@ def _shifts(data: TrainingSet, selection: Selection) -> tuple[np.ndarray, np.nda
     known = data.neutral_features
     if selection.anchor == "none" or selection.bias == "shared" or not known:
         return np.zeros((0, 0)), np.zeros(0)
-    mean = np.mean(list(known.values()), axis=0, dtype=np.float64)
+    mean = np.array(list(known.values())).mean(axis=0, dtype=np.float64)
     return np.array([known.get(subject, mean) - mean for subject in data.subjects]), mean
 
 

@@ -114,9 +114,9 @@ def contour_track(inputs, tracker, fit, take, correspondence, contours, cfg):
         correspondence.coarse_neutral_mm, tracker.triangles, seam_mm
     )
     # A frame whose features are not valid may have contours all the same.
-    take = replace(take, image=ImageContours(tracker, fit.camera, **contours))
-    fitted = ContourTracker(tracker, shapes, take.image.outer_px.shape[1], ridge)
-    return fitted.track(take, fit.weights[fit.index_of(take.frames)])
+    image = ImageContours(tracker, fit.camera, **contours)
+    fitted = ContourTracker(tracker, shapes, image.outer_px.shape[1], ridge)
+    return fitted.track(take, image, fit.weights[fit.index_of(take.frames)])
 
 
 def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
