@@ -32,7 +32,7 @@ CLASSES = {
         ("contours.detector.boosting", "contours.detector"),
         {"n_trees": "contours.detector.boosting.trees"},
     ),
-    "contours.detector.BoostedDetector": Pair(("contours.detector",)),
+    "contours.boosted.BoostedDetector": Pair(("contours.detector",)),
     "contours.ridges.RidgeDetector": Pair(
         ("contours.detector",),
         {
@@ -50,7 +50,6 @@ CLASSES = {
     "contours.training.TrainingSettings": Pair(
         ("contours.detector",), {"n_features": "contours.detector.features"}
     ),
-    "correction.image_contours.ImageContourSettings": Pair(("correction.image",)),
     "detail.flow.deformation.DeformationSettings": Pair(("detail.deformation",)),
     "detail.flow.six_frame_flow.FlowSettings": Pair(("detail.flow",)),
     "detail.relief.relief.ReliefSettings": Pair(("detail.relief",)),
@@ -94,7 +93,6 @@ CLASSES = {
 
 #: Classes with a number as a default that no configuration sets.
 WITHOUT_SECTION = {
-    "evaluation.corrected.CoarseTake": "0 switches the integration's steps off",
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
     "landmarks.appearance.AppearanceSettings": "Mono13's constants for likeness of frames",
     "multiview.neutral.Neutral": "a result: the first take's neutral has not moved",
@@ -106,12 +104,8 @@ FUNCTIONS = {
     "capture.manifest.capture_manifest": {"hash_decoded": "capture.manifest.hash_decoded"},
     "capture.patches.align_patches": {"radius_px": "capture.refinement.patch_radius_px"},
     "contours.training.train_detector": {"seed": "contours.detector.seed"},
-    "correction.correct.Corrector": {"seam_mm": "correction.integration.seam_mm"},
     "correction.domain.integration_domain": {"seam_mm": "correction.integration.seam_mm"},
-    "correction.correct.correct_sequence": {"seam_mm": "correction.integration.seam_mm"},
-    "correction.correct.correct_with_layers": {"seam_mm": "correction.integration.seam_mm"},
     "correction.integration.LayerIntegrator": {"seam_mm": "correction.integration.seam_mm"},
-    "correction.take_layers.take_layers": {"head": "correction.layers.head"},
     "correspondence.correspondence.find_correspondence": {
         "mask_radius_mm": "correspondence.mask_radius_mm",
         "eye_gap_mm": "correspondence.eye_gap_mm",

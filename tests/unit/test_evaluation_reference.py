@@ -29,7 +29,7 @@ def test_truth_of_vertices_never_mixes_the_lips():
         coarse.neutral_mm, None, 0.5, sides, triangle_sides(fine.triangles, of_fine)
     )
     mesh = Mesh(fine.neutral_mm, fine.triangles)
-    found = truth_of_vertices(where, mesh, of_fine, sides, mesh, MatchTolerance(3.0, 0.5))
+    found = truth_of_vertices(where, mesh, of_fine, sides, mesh, MatchTolerance(3.0, 60.0))
     assert found.bound.all()
     corners = of_fine[fine.triangles[found.triangle]]
     for side in (1, -1):

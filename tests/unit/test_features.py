@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.unit.mouths import crest, draw_mouth, ellipse, facing_camera, mouth_model
+from vermilion.contours.curves import inward_normals
 from vermilion.features.contour_features import ContourSampler, interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
-from vermilion.features.search import SearchSettings, find_inner, inward_normals
+from vermilion.features.search import SearchSettings, find_inner
 from vermilion.features.shape_space import shape_space
 from vermilion.features.vector import FeatureTable, feature_names, quality_row
 from vermilion.geometry.head_frame import head_from_world

@@ -18,13 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from vermilion.contours.curves import smoothed_ring
+from vermilion.contours.curves import inward_normals, smoothed_ring
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.image_contours import ImageContours
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
-from vermilion.features.search import inward_normals
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.geometry.surface_points import SurfacePoints

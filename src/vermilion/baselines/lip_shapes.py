@@ -8,7 +8,7 @@ more medoid that is always there; nothing is random.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +44,7 @@ class LipShapes:
     @classmethod
     def load(cls, path: str | Path) -> LipShapes:
         """Read what `save` wrote."""
-        return cls(**read_arrays(path, "file of lip shapes", cls.__dataclass_fields__))
+        return cls(**read_arrays(path, "file of lip shapes", [f.name for f in fields(cls)]))
 
     def on(self, neutral_mm: np.ndarray, triangles: np.ndarray, seam_mm: float) -> np.ndarray:
         """Displacements (S, V, 3) mm on another identity: deformation transfer (Sumner 2004).

@@ -71,18 +71,27 @@ def sampled(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
     return sample_bilinear(plane, points).astype(np.float64)
 
 
-def outward_normals(curve: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 2) of a closed curve of many points."""
-    tangent = np.roll(curve, -4, axis=0) - np.roll(curve, 4, axis=0)
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-    following = np.roll(curve, -1, axis=0)
-    area = np.sum(curve[:, 0] * following[:, 1] - curve[:, 1] * following[:, 0])
+def inward_normals(ring: np.ndarray, apart: int = 1) -> np.ndarray:
+    """Unit normals, as the closed ring (n, 2 or 3), towards its inside in the plane of x and y.
+
+    The tangent is that between the neighbours so many samples `apart` to either side.
+    """
+    tangent = np.roll(ring, -apart, axis=0) - np.roll(ring, apart, axis=0)
+    normal = np.zeros_like(ring, dtype=np.float64)
+    normal[:, 0], normal[:, 1] = -tangent[:, 1], tangent[:, 0]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    following = np.roll(ring, -1, axis=0)
+    area = np.sum(ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0])
     return normal if area > 0 else -normal
 
 
+def outward_normals(curve: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 2) of a closed curve of many points, away from its inside."""
+    return -inward_normals(curve, 4)
+
+
 def inside_and_distance(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """InnerCues of a closed curve (size, size) bool, and the distance to it to a pixel."""
+    """Inside of a closed `curve` (n, 2), (size, size) bool, and the distance to it, (size, size), px."""
     away = np.ones((size, size), dtype=np.uint8)
     cv2.polylines(away, [np.rint(curve - 0.5).astype(np.int32)], True, 0)
     distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
@@ -90,7 +99,7 @@ def inside_and_distance(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.nd
 
 
 def filled(curve: np.ndarray, size: int) -> np.ndarray:
-    """InnerCues of a closed curve (size, size) bool."""
+    """Inside of a closed `curve` (n, 2), (size, size) bool."""
     inside = np.zeros((size, size), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(curve - 0.5).astype(np.int32)], 1)
     return inside > 0

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vermilion.contours.paths import cheapest_path
 from vermilion.imaging.sampling import sample_bilinear
@@ -76,8 +77,6 @@ def label_paths(capture: Source, camera: str) -> dict[int, Path]:
 
 def distance_to(points_px: np.ndarray, size: int) -> np.ndarray:
     """Distance (size, size) px of each pixel centre of a region to dense `points_px` (n, 2)."""
-    from scipy.spatial import cKDTree
-
     x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
     grid = np.stack([x.ravel(), y.ravel()], axis=1)
     distance, _ = cKDTree(points_px).query(grid)

@@ -100,6 +100,19 @@ class RidgeDetector(ContourDetector):
     edge_weight: float = 4.0
     stiffness: float = 6.0
 
+    @classmethod
+    def of(cls, section, reach: float, **others: float) -> Self:
+        """From the section `contours.detector` of the configuration, with its `reach` and `others`."""
+        return cls(
+            interocular_size_px=section.interocular_size_px,
+            margin=section.margin,
+            width=section.ridge_width,
+            reach=reach,
+            edge_weight=section.edge_weight,
+            stiffness=section.stiffness,
+            **others,
+        )
+
     def fit_border(
         self,
         curve: np.ndarray,

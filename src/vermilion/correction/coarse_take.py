@@ -108,7 +108,8 @@ class CoarseTake:
     def __getitem__(self, rows: np.ndarray | slice) -> CoarseTake:
         """The same of some frames, by rows or (F,) bool."""
         given: dict[str, Any] = {name: getattr(self, name) for name in _PER_FRAME}
-        return replace(self, **{n: v if v is None else v[rows] for n, v in given.items()})
+        chosen = {name: v[rows] for name, v in given.items() if v is not None}
+        return replace(self, **chosen)
 
     def usable(self, inputs: np.ndarray) -> np.ndarray:
         """Which frames can be corrected, (F,) bool: tracked, with a finite mesh and finite inputs.

@@ -82,7 +82,7 @@ def correct_with_layers(
         take.neutral_mm, take.triangles, mask, settings.seam_mm, settings.detail_mm
     )
     rows = take.usable(layers)
-    targets_mm = displacement_mm[rows] if settings.detail_mm > 0 else None
+    targets_mm = None if displacement_mm is None else displacement_mm[rows]
     head_mm = integrator.integrate(_in_head(take[rows]), layers[rows], targets_mm)
     return _in_world(take, rows, head_mm, _agreement(integrator, take, settings))
 

@@ -11,9 +11,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vermilion.contours.curves import smoothed_ring
+from vermilion.contours.curves import inward_normals, smoothed_ring
 from vermilion.faces.model import FaceModel
-from vermilion.features.search import inward_normals
 from vermilion.geometry.camera import Camera
 
 #: Arrays of the feature files that image-space contours are made of.

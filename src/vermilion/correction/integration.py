@@ -148,7 +148,9 @@ class LayerIntegrator:
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = mixture[part]
             lanes[:, : len(given)] = given.T
-            accumulate_mixture(*self._triangles(points), basis, lanes, *_series(basis.dtype), right)
+            accumulate_mixture(  # type: ignore[call-arg]  # as above
+                *self._triangles(points), basis, lanes, *_series(basis.dtype), right
+            )
             if len(self.places):
                 add_places(self._row[self.places], place_basis, lanes, right)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +47,6 @@ def take_layers(
     rotation: np.ndarray,
     translation_mm: np.ndarray,
     *,
-    head: Literal["frame", "neutral"] = "frame",
     accurate_neutral_mm: np.ndarray | None = None,
     face: np.ndarray | None = None,
 ) -> TakeLayers:
@@ -57,19 +56,19 @@ def take_layers(
         accurate_mm: (F, V_H, 3) H, world.
         coarse_mm: (F, V, 3) C, world.
         rotation, translation_mm: (F, 3, 3), (F, 3), the tracker's `world_from_head`.
-        head: `frame` aligns H to C on the rigid region in every frame; `neutral` aligns H to its
-            own neutral, and that to C's neutral once.
-        accurate_neutral_mm: (V_H, 3), needed for `neutral`.
+        accurate_neutral_mm: (V_H, 3), H's own neutral, world: H is aligned to it, and it to C's neutral
+            once. None: H is aligned to C in every frame.
         face: (V,) bool, the face of C: H is aligned on all of it outside the mask, by area, as the
             evaluation does. None: on the rigid region, without the fifth of it that fits worst.
     """
     coarse = head_from_world(coarse_mm, rotation, translation_mm)
     accurate = correspondence.on_coarse(np.asarray(accurate_mm))
-    fixed, trimming = correspondence.rigid, {"trim": 0.2, "rounds": 2}
+    fixed = correspondence.rigid
+    trimming: dict[str, Any] = {"trim": 0.2, "rounds": 2}
     if face is not None:
         fixed, trimming = _face_outside_mask(correspondence, face), {}
     target = coarse
-    if head == "neutral":
+    if accurate_neutral_mm is not None:
         neutral = correspondence.on_coarse(accurate_neutral_mm)[None]
         placed = align_frames(neutral, correspondence.coarse_neutral_mm, fixed, **trimming)
         target = placed.apply(neutral)[0]

@@ -15,7 +15,7 @@ from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import Mesh, topology_hash, triangle_normals
+from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -31,7 +31,6 @@ class Correspondence:
     Attributes:
         vertices: C vertex -> point of H, (V,); unbound where H is absent.
         triangles: (T,) int32 C triangle -> H triangle, -1 where H is absent.
-        distance_mm: (V,) between the registered C vertex and its point of H; infinite if unbound.
         mask: (M,) int32 ids of the C triangles of the correction layer.
         rigid: (V,) bool, bound C vertices outside the mask by which heads are aligned.
         accurate_triangles: (T_H, 3) int32 topology of H.
@@ -41,7 +40,6 @@ class Correspondence:
 
     vertices: SurfacePoints
     triangles: np.ndarray
-    distance_mm: np.ndarray
     mask: np.ndarray
     rigid: np.ndarray
     accurate_triangles: np.ndarray
@@ -49,9 +47,9 @@ class Correspondence:
     coarse_neutral_mm: np.ndarray
 
     @property
-    def topology(self) -> str:
-        """Hash of C's topology; layers and regressors of another one do not fit."""
-        return topology_hash(self.coarse_triangles)
+    def distance_mm(self) -> np.ndarray:
+        """(V,) between the registered C vertex and its point of H; infinite if unbound."""
+        return np.asarray(self.vertices.distance_mm)
 
     def on_coarse(self, accurate_mm: np.ndarray) -> np.ndarray:
         """H on the topology of C.
@@ -98,7 +96,6 @@ class Correspondence:
                 arrays["vertex_triangle"], arrays["vertex_barycentric"], arrays["distance_mm"]
             ),
             triangles=arrays["triangle_triangle"],
-            distance_mm=arrays["distance_mm"],
             mask=arrays["mask"],
             rigid=arrays["rigid"],
             accurate_triangles=arrays["accurate_triangles"],
@@ -190,7 +187,6 @@ def find_correspondence(
     correspondence = Correspondence(
         vertices=vertices,
         triangles=owner,
-        distance_mm=vertices.distance_mm,
         mask=mask,
         rigid=rest,
         accurate_triangles=accurate.mesh.triangles,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +12,10 @@ from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
 
-@dataclass(frozen=True)
-class TakeFiles:
-    """A take as read: its entry and the names of its features."""
-
-    entry: TakeEntry
-    feature_names: tuple[str, ...]
-
-
 def read_take_files(
     row: Mapping, layer_paths: Sequence[str | Path], feature_paths: Sequence[str | Path]
-) -> TakeFiles:
-    """Join the chunks of a take, in order.
+) -> tuple[TakeEntry, tuple[str, ...]]:
+    """Join the chunks of a take, in order: its entry and the names of its features.
 
     Args:
         row: subject, take, fps, split, and `train`, the frame numbers that train.
@@ -64,4 +55,4 @@ def read_take_files(
         valid=valid,
         train=np.isin(frames, row["train"]),
     )
-    return TakeFiles(entry, tuple(str(name) for name in features[0]["names"]))
+    return entry, tuple(str(name) for name in features[0]["names"])

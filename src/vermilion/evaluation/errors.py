@@ -135,12 +135,7 @@ def sums_of_jitter(
     excess = second_differences(aligned_mm, frames) - second_differences(
         reference.points_mm, frames
     )
-    return _sums_by_region("jitter", excess, regions, clips)
-
-
-def sums_of_drift(drift_mm: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
-    """Sums behind `drift_mm`, of drift_mm (F, V), by clips (F,); NaN does not count."""
-    return _sums_by_region("drift", drift_mm, regions, clips)
+    return sums_by_region("jitter", excess, regions, clips)
 
 
 def sums_of_aperture(
@@ -160,14 +155,11 @@ def sums_of_aperture(
     known = np.isfinite(difference)
     touch = known & (_widest(reference_gaps) <= tolerances.touch_mm)
     gape = touch & (_widest(result_gaps) > tolerances.gape_mm)
-    return ClipSums(
-        {
-            "mouth.aperture_frames": by_clip(known.astype(float), clips),
-            "mouth.aperture": by_clip(np.where(known, difference, 0.0), clips),
-            "mouth.touch_frames": by_clip(touch.astype(float), clips),
-            "mouth.false_open": by_clip(gape.astype(float), clips),
-        }
-    )
+    closed = {
+        "mouth.touch_frames": by_clip(touch.astype(float), clips),
+        "mouth.false_open": by_clip(gape.astype(float), clips),
+    }
+    return sums_of_frames("mouth.aperture", difference, clips) + ClipSums(closed)
 
 
 def gaps_in_head(
@@ -209,7 +201,7 @@ def sums_of_motion_errors(
     offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
     known = np.isfinite(offset)
     mean = np.where(known, offset, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return _sums_by_region("moving", np.linalg.norm(offset - mean, axis=2), regions, clips)
+    return sums_by_region("moving", np.linalg.norm(offset - mean, axis=2), regions, clips)
 
 
 def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
@@ -223,8 +215,8 @@ def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums
     )
 
 
-def _sums_by_region(name: str, values: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
-    """Sums of values (F, V) and of the weights of those known, by region and clip (F,)."""
+def sums_by_region(name: str, values: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
+    """Sums of values (F, V) and of the weights of those known (NaN does not count), by region and clip (F,)."""
     sums = {}
     for region, weights in regions.weights.items():
         known, total = weighted_sums(values, weights, clips)

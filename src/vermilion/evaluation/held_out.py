@@ -10,20 +10,16 @@ import numpy as np
 from vermilion.config.regressors import is_variant
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, Corrector
-from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation.contour_error import contour_error
 from vermilion.evaluation.errors import ClipSums, sums_of_frames
-from vermilion.evaluation.reference import MatchTolerance, Reference, truth_of_vertices
+from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.take import TakeResult
-from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.features.occluding import OccludingContour
 from vermilion.geometry.camera import Camera
-from vermilion.geometry.mesh import Mesh, triangle_areas
-from vermilion.geometry.surface_points import SurfacePoints
+from vermilion.geometry.mesh import triangle_areas
+from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.regression.model import LipModel
-
-_EYE_CORNERS = (36, 45)
 
 
 @dataclass(frozen=True)
@@ -60,32 +56,6 @@ class Regressed:
         return cls(model, corrected_mm, seconds / usable.sum() if usable.any() else np.nan)
 
 
-def points_on_truth(
-    correspondence: Correspondence,
-    tracker: FaceModel,
-    template: FaceModel,
-    h_neutral_mm: np.ndarray,
-    truth_neutral_mm: np.ndarray,
-    truth_triangles: np.ndarray,
-    max_distance_mm: float,
-    max_normal_angle_deg: float,
-) -> SurfacePoints:
-    """The point of the truth of each vertex of C, by way of H; see `truth_of_vertices`.
-
-    Args:
-        h_neutral_mm, truth_neutral_mm: (V_H, 3), (V', 3), the same frame in the world of the rig.
-        truth_triangles: (T', 3).
-    """
-    return truth_of_vertices(
-        correspondence.vertices,
-        Mesh(np.asarray(h_neutral_mm, dtype=np.float64), correspondence.accurate_triangles),
-        lip_sides(template),
-        lip_sides(tracker),
-        Mesh(np.asarray(truth_neutral_mm, dtype=np.float64), truth_triangles),
-        MatchTolerance(max_distance_mm, float(np.cos(np.radians(max_normal_angle_deg)))),
-    )
-
-
 def sums_of_contours(
     sequence_mm: np.ndarray,
     coarse_mm: np.ndarray,
@@ -102,7 +72,7 @@ def sums_of_contours(
         outer_px, inner_px: (F, n, 2) contour points found in the image; NaN where none.
         clips: (F,) clip of each frame.
     """
-    eyes = camera.project(coarse_mm[:, tracker.landmarks[list(_EYE_CORNERS)]])
+    eyes = camera.project(coarse_mm[:, tracker.landmarks[EYE_CORNERS]])
     distance = contour_error(
         sequence_mm,
         camera,

@@ -94,37 +94,46 @@ class MatchTolerance:
 
     Attributes:
         max_distance_mm: points farther away have no counterpart.
-        min_cosine: between the normals of a point and of its triangle, at least.
+        max_normal_angle_deg: between the normals of a point and of its triangle.
     """
 
     max_distance_mm: float
-    min_cosine: float
+    max_normal_angle_deg: float
+
+    @property
+    def min_cosine(self) -> float:
+        """Of the angle between the normals."""
+        return float(np.cos(np.radians(self.max_normal_angle_deg)))
 
 
 def attach(
     points_mm: np.ndarray,
     normals: np.ndarray,
     sides: np.ndarray,
-    surface: Surface,
-    surface_sides: np.ndarray,
+    h_neutral: Mesh,
+    h_sides: np.ndarray,
+    truth_neutral: Mesh,
     near: MatchTolerance,
 ) -> SurfacePoints:
-    """The point of a surface that each given point lies on, in the neutral, once a subject.
+    """The truth's point that each given point lies on, in the neutral, once a subject.
 
     Closest point among the triangles that face the same way and do not belong to the other lip.
 
     Args:
-        points_mm, normals: (N, 3) in the surface's world, mm; unit.
+        points_mm, normals: (N, 3) in the truth's world, mm; unit.
         sides: (N,) lips, +1 upper, -1 lower, 0 neither.
-        surface: T triangles.
-        surface_sides: (T,) lips of its triangles.
+        h_neutral: Vh vertices of H, mm, by which the truth's lips are known.
+        h_sides: (Vh,) lips of H's vertices.
+        truth_neutral: the truth's mesh, mm.
         near: points that are not near are unbound.
 
     Returns:
-        N points of the surface.
+        N points of the truth.
     """
-    found = surface.closest(points_mm, normals, near.min_cosine, sides, surface_sides)
-    return found.restricted(found.distance_mm <= near.max_distance_mm)
+    truth_sides = transfer_lips(h_neutral, h_sides, truth_neutral, near)
+    surface = Surface(truth_neutral.vertices_mm, truth_neutral.triangles)
+    found = surface.closest(points_mm, normals, near.min_cosine, sides, truth_sides)
+    return found.within(near.max_distance_mm)
 
 
 def transfer_lips(mesh: Mesh, sides: np.ndarray, other: Mesh, near: MatchTolerance) -> np.ndarray:
@@ -143,9 +152,9 @@ def transfer_lips(mesh: Mesh, sides: np.ndarray, other: Mesh, near: MatchToleran
     middles = other.vertices_mm[other.triangles].mean(axis=1)
     normals = triangle_normals(other.vertices_mm, other.triangles)
     found = Surface(mesh.vertices_mm, mesh.triangles).closest(middles, normals, near.min_cosine)
-    close = found.bound & (found.distance_mm <= near.max_distance_mm)
+    close = found.within(near.max_distance_mm)
     of_triangle = triangle_sides(mesh.triangles, sides)
-    return np.where(close, of_triangle[np.maximum(found.triangle, 0)], 0)
+    return np.where(close.bound, of_triangle[np.maximum(found.triangle, 0)], 0)
 
 
 def truth_of_vertices(
@@ -172,14 +181,12 @@ def truth_of_vertices(
     Returns:
         V points of the truth; unbound where H or the truth has none.
     """
-    truth_sides = transfer_lips(h_neutral, h_sides, truth_neutral, near)
     on_h = vertex_normals(h_neutral.vertices_mm, h_neutral.triangles)
     points, normals = (
         np.nan_to_num(where_on_h.sample(values, h_neutral.triangles))
         for values in (h_neutral.vertices_mm, on_h)
     )
-    surface = Surface(truth_neutral.vertices_mm, truth_neutral.triangles)
-    found = attach(points, normals, sides, surface, truth_sides, near)
+    found = attach(points, normals, sides, h_neutral, h_sides, truth_neutral, near)
     return found.restricted(where_on_h.bound)
 
 

@@ -12,8 +12,8 @@ from vermilion.evaluation.errors import (
     ClipSums,
     by_clip,
     gaps_in_head,
+    sums_by_region,
     sums_of_aperture,
-    sums_of_drift,
     sums_of_errors,
     sums_of_frames,
     sums_of_jitter,
@@ -166,9 +166,9 @@ def evaluate_reconstruction(
     hidden = np.where(seen, 0.0, np.nan)
     sums = sums_of_errors(errors, surface, regions, clips)
     sums += sums_of_jitter(sequence_mm, reference, frames, regions, clips)
-    sums += sums_of_drift(drift_mm, regions, clips)
+    sums += sums_by_region("drift", drift_mm, regions, clips)
     sums += sums_of_errors(errors + hidden, surface + hidden, shown, clips)
-    sums += sums_of_drift(drift_mm + hidden, shown, clips)
+    sums += sums_by_region("drift", drift_mm + hidden, shown, clips)
     return {"H": sums}
 
 

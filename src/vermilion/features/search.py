@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.contours.curves import smoothed_ring
+from vermilion.contours.curves import inward_normals, smoothed_ring
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.features.arch import arch_depth
 from vermilion.imaging.sampling import sample_bilinear
@@ -77,17 +77,6 @@ class FoundRing:
     points: np.ndarray
     offset: np.ndarray
     found: np.ndarray
-
-
-def inward_normals(ring: np.ndarray) -> np.ndarray:
-    """Unit normals, as the closed ring (n, 2 or 3), towards its inside in the plane of x and y."""
-    tangent = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
-    normal = np.zeros_like(ring, dtype=np.float64)
-    normal[:, 0], normal[:, 1] = -tangent[:, 1], tangent[:, 0]
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    following = np.roll(ring, -1, axis=0)
-    area = np.sum(ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0])
-    return normal if area > 0 else -normal
 
 
 def find_outer(

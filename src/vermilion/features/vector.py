@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,6 @@ from vermilion.features.contour_features import FrameContours
 from vermilion.features.distances import NAMES
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.quality import QualityRow
-
-ARRAYS = (
-    "frames", "features", "names", "outer_px", "inner_px", "outer_found", "inner_found", "valid",
-    "found",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,12 +68,12 @@ class FeatureTable:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(path, compressed=True, **{name: getattr(self, name) for name in ARRAYS})
+        write_arrays(path, compressed=True, **vars(self))
 
     @classmethod
     def load(cls, path: str | Path) -> FeatureTable:
         """Read what `save` wrote. Raises InputError on any other file."""
-        return cls(**read_arrays(path, "feature file", ARRAYS))
+        return cls(**read_arrays(path, "feature file", [f.name for f in fields(cls)]))
 
 
 def feature_names(n_shape: int, space: str = "image") -> np.ndarray:

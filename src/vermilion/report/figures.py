@@ -12,11 +12,11 @@ from vermilion.config.regressors import in_order, is_variant, kind_of
 from vermilion.imaging.plot import new_figure, plain, save, with_gaps
 from vermilion.report.table1 import place_of
 
+_INK = "#222222"
 COLOURS = {
     "base": "#8c8c8c", "oracle": "#2b2b2b", "contour": "#b08d57", "PS": "#c8553d",
-    "MS": "#2a6f97", "GR": "#4f8a3c", "H": "#7b5ea7",
+    "MS": "#2a6f97", "GR": "#4f8a3c", "H": "#7b5ea7", "truth": _INK,
 }  # fmt: skip
-_INK = "#222222"
 
 
 def colour_of(regressor: str) -> str:
@@ -25,7 +25,8 @@ def colour_of(regressor: str) -> str:
 
 
 def line_style(regressor: str) -> str:
-    return "--" if "/" in regressor else "-"
+    """Dotted for truth, dashed for a variant."""
+    return ":" if regressor == "truth" else "--" if "/" in regressor else "-"
 
 
 def plot_curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
@@ -43,17 +44,11 @@ def plot_curves(table: pd.DataFrame, title: str, out: str | Path) -> None:
         ("aperture_mm", "gap, mm"),
     )
     for axis, (column, text) in zip(axes, panels, strict=True):
-        for regressor in in_order(r for r in table["regressor"] if r != "truth"):
+        for regressor in [*in_order(r for r in table["regressor"] if r != "truth"), "truth"]:
             rows = table[table["regressor"] == regressor]
             axis.plot(
                 *with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
                 line_style(regressor), color=colour_of(regressor), lw=1.4, label=regressor,
-            )  # fmt: skip
-        if column == "aperture_mm":
-            rows = table[table["regressor"] == "truth"]
-            axis.plot(
-                *with_gaps(rows["frame"].to_numpy(), rows[column].to_numpy(dtype=float)),
-                ":", color=_INK, lw=1.4, label="truth",
             )  # fmt: skip
         axis.set_ylabel(text)
         plain(axis)

@@ -155,7 +155,7 @@ def _flagged(frames: pd.DataFrame) -> str:
     bad = frames[frames["valid"] == 0] if len(frames) else frames
     if bad.empty:
         return '<p class="none">None.</p>'
-    rows = _grouped(bad, "reason")
+    rows = page.frames_of_each(bad, ["reason"])
     note = "<p>The positions of these frames are not to be trusted.</p>"
     return note + page.table(rows, {"which": "frames", "count": "count", "reason": "reason"})
 
@@ -166,7 +166,7 @@ def _missing(found: TakeFindings) -> str:
         return '<p class="none">None: every camera has every frame that could be read.</p>'
     names = {"camera": "camera", "which": "frames", "count": "count", "reason": "reason"}
     first = rows.groupby("camera", sort=True)["reason"].first()
-    table = _grouped(rows, "camera")
+    table = page.frames_of_each(rows, ["camera"])
     return page.table(table.assign(reason=table["camera"].map(first)), names)
 
 
@@ -174,15 +174,6 @@ def _missing_rows(found: TakeFindings) -> pd.DataFrame:
     rows = found.drift if len(found.frames) else found.across
     reasons = rows["reason"].fillna("")
     return rows[(rows["camera"] != ALL) & (reasons != "")]
-
-
-def _grouped(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    return (
-        rows.groupby(column, sort=False)["frame"]
-        .agg(["count", lambda numbers: page.spans(numbers.tolist())])
-        .set_axis(["count", "which"], axis=1)
-        .reset_index()
-    )
 
 
 _CAMERA_COLUMNS = {

@@ -90,6 +90,16 @@ def spans(frames: Sequence[int]) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
 
 
+def frames_of_each(rows: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+    """Of the rows with the same values in the columns, in order: how many frames (`count`), `which`."""
+    return (
+        rows.groupby(list(columns), sort=False)["frame"]
+        .agg(["count", lambda numbers: spans(numbers.tolist())])
+        .set_axis(["count", "which"], axis=1)
+        .reset_index()
+    )
+
+
 def table(rows: pd.DataFrame, headings: dict[str, str], group: str | None = None) -> str:
     """Columns of a table under other headings; a line above each new value of column `group`."""
     numeric = {c for c in headings if pd.api.types.is_numeric_dtype(rows[c])}

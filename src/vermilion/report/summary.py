@@ -215,21 +215,14 @@ def _videos(found: SummaryInputs, limit_mb: float) -> str:
     videos = "".join(
         page.video(path, caption.format(name), limit_mb) for name, path in found.videos
     )
-    return videos + "".join(
-        page.image(path, _TIMELINE_CAPTION.format(name)) for name, path in found.timelines
-    )
+    return videos + _images(found.timelines, _TIMELINE_CAPTION)
 
 
 def _flagged(found: SummaryInputs) -> str:
     if found.flagged.empty:
         return '<p class="none">None.</p>'
     rows = found.flagged.assign(where=found.flagged["subject"] + "/" + found.flagged["take"])
-    counts = (
-        rows.groupby(["stage", "where", "reason"], sort=False)["frame"]
-        .agg(["count", lambda frames: page.spans(frames.tolist())])
-        .set_axis(["count", "which"], axis=1)
-        .reset_index()
-    )
+    counts = page.frames_of_each(rows, ["stage", "where", "reason"])
     headings = {
         "stage": "stage", "where": "take", "count": "frames", "which": "which", "reason": "reason"
     }  # fmt: skip

@@ -41,15 +41,8 @@ def from_track(cfg, camera, source, track, rings, inner_reach):
     """The detector that a take's own images and the rings tell; None where no frame serves."""
     options = cfg.track
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
-    detector = TrackRidgeDetector(
-        cfg.interocular_size_px,
-        cfg.margin,
-        cfg.ridge_width,
-        inner_reach,
-        cfg.edge_weight,
-        cfg.stiffness,
-        options.frame_reach,
-        options.lip_reach,
+    detector = TrackRidgeDetector.of(
+        cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach
     )
     return learn_from_take(
         detector,
@@ -87,14 +80,8 @@ def main(snakemake) -> None:
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
     else:
-        detector = by_track or LandmarkRidgeDetector(
-            cfg.interocular_size_px,
-            cfg.margin,
-            cfg.ridge_width,
-            cfg.lips_reach if dense else cfg.ridge_reach,
-            cfg.edge_weight,
-            cfg.stiffness,
-        )
+        reach = cfg.lips_reach if dense else cfg.ridge_reach
+        detector = by_track or LandmarkRidgeDetector.of(cfg, reach)
     detector.save(snakemake.output.detector)
     rows.sort(key=lambda row: row.frame)
     write_quality(snakemake.output.quality, subject, take, "contour labels", rows)

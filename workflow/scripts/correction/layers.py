@@ -23,6 +23,7 @@ def main(snakemake):
     rows = fit.index_of(frames)
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     neutral = read_arrays(inputs.accurate_neutral, "neutral", ("vertices_mm",), **place)
+    neutral_mm = neutral["vertices_mm"].astype(np.float64)
     reconstructed = read_table(inputs.accurate_quality, ["frame", "valid"])
     bad = set(reconstructed.loc[reconstructed["valid"] == 0, "frame"])
     made = take_layers(
@@ -31,8 +32,7 @@ def main(snakemake):
         read_sequence(inputs.coarse),
         fit.world_from_head_rotation[rows],
         fit.world_from_head_translation_mm[rows],
-        head=cfg.head,
-        accurate_neutral_mm=neutral["vertices_mm"].astype(np.float64),
+        accurate_neutral_mm=neutral_mm if cfg.head == "neutral" else None,
         face=FaceModel.load(inputs.tracker).regions["face"] if cfg.region == "face" else None,
     )
     checked, quality = quality_rows(

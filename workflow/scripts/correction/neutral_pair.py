@@ -29,8 +29,7 @@ def main(snakemake):
         read_frames(inputs.coarse, [frame]),
         fit.world_from_head_rotation[row],
         fit.world_from_head_translation_mm[row],
-        accurate_neutral_mm=neutral,
-        head=cfg.head,
+        accurate_neutral_mm=neutral if cfg.head == "neutral" else None,
         face=FaceModel.load(inputs.tracker).regions["face"] if cfg.region == "face" else None,
     )
     checked, (quality,) = quality_rows(

@@ -26,13 +26,13 @@ def main(snakemake):
         for take in params.takes
     ]
     first = next(iter(maps.values()))
-    names = read_take_files(*files[0]).feature_names
+    names = read_take_files(*files[0])[1]
     write_database(
         snakemake.output.database,
         first.coarse_triangles,
         names,
         entries,
-        (read_take_files(*each).entry for each in progress(files, "takes")),
+        (read_take_files(*each)[0] for each in progress(files, "takes")),
         **cfg.model_dump(),
     )
 

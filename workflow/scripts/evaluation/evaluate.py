@@ -20,10 +20,12 @@ from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.lips import LipTolerances
 from vermilion.evaluation.masks import regions_of_mask
 from vermilion.evaluation.measures import measure_rows
-from vermilion.evaluation.reference import reference_of
+from vermilion.evaluation.reference import MatchTolerance, reference_of, truth_of_vertices
 from vermilion.evaluation.take import evaluate_take, sums_of_layers, with_layer_errors
 from vermilion.evaluation.truth import read_curves, read_truth
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
+from vermilion.geometry.mesh import Mesh
 from vermilion.regression.model import load_model
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
@@ -61,14 +63,15 @@ def reference(snakemake, tracker, correspondence, frames, place):
             "H", where, vertices, correspondence.accurate_triangles, neutral, **place
         )
     (neutral,), triangles = read_truth(*inputs.neutral_truth, rows=np.array([0]), **place)
-    where = held_out.points_on_truth(
-        correspondence,
-        tracker,
-        FaceModel.load(inputs.template),
-        read_sequence(inputs.neutral_accurate)[0],
-        neutral,
-        triangles,
-        **ReferenceConfig(**snakemake.params.cfg["evaluation.reference"]).model_dump(),
+    near = ReferenceConfig(**snakemake.params.cfg["evaluation.reference"])
+    at_rest = read_sequence(inputs.neutral_accurate)[0].astype(np.float64)
+    where = truth_of_vertices(
+        correspondence.vertices,
+        Mesh(at_rest, correspondence.accurate_triangles),
+        lip_sides(FaceModel.load(inputs.template)),
+        lip_sides(tracker),
+        Mesh(neutral.astype(np.float64), triangles),
+        MatchTolerance(**near.model_dump()),
     )
     sequence, _ = read_truth(*inputs.truth, rows=frames - snakemake.params.first, **place)
     return reference_of("truth", where, sequence, triangles, neutral, **place)

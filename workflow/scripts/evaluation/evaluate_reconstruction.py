@@ -12,7 +12,6 @@ from vermilion.evaluation.reference import (
     attach,
     drift,
     reference_of,
-    transfer_lips,
 )
 from vermilion.evaluation.take import evaluate_reconstruction
 from vermilion.evaluation.truth import read_truth
@@ -20,7 +19,6 @@ from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
-from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, vertex_normals
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -32,14 +30,9 @@ def main(snakemake):
     inputs, cfg = snakemake.input, snakemake.params.cfg
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     options = MeasuresConfig(**cfg["evaluation.measures"])
-    reach = ReferenceConfig(**cfg["evaluation.reference"])
-    near = MatchTolerance(
-        reach.max_distance_mm, float(np.cos(np.radians(reach.max_normal_angle_deg)))
-    )
-    template, correspondence = (
-        FaceModel.load(inputs.template),
-        Correspondence.load(inputs.correspondence),
-    )
+    near = MatchTolerance(**ReferenceConfig(**cfg["evaluation.reference"]).model_dump())
+    template = FaceModel.load(inputs.template)
+    correspondence = Correspondence.load(inputs.correspondence)
     triangles = template.triangles
     frames = frames_of(inputs.accurate)
     sequence = np.asarray(read_sequence(inputs.accurate), dtype=np.float64)
@@ -57,12 +50,9 @@ def main(snakemake):
     )
     neutral_truth = truth[0].astype(np.float64)
     sides = lip_sides(template)
-    truth_sides = transfer_lips(
-        Mesh(sequence[0], triangles), sides, Mesh(neutral_truth, truth_triangles), near
-    )
     where = attach(
         sequence[0], vertex_normals(sequence[0], triangles), sides,
-        Surface(neutral_truth, truth_triangles), truth_sides, near,
+        Mesh(sequence[0], triangles), sides, Mesh(neutral_truth, truth_triangles), near,
     )  # fmt: skip
     reference = reference_of("truth", where, truth, truth_triangles, **place)
     mouth = mask_on(
