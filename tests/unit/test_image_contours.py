@@ -72,7 +72,7 @@ def take_of(heads_mm, image, pose=None, frames=None):
 def fitted(corrected, image, settings, coarse=None, pose=None, frames=None):
     fit = ImageAgreement(integrator(), FACE.neutral_mm, FACE, N_SAMPLES, settings)
     coarse = corrected if coarse is None else coarse
-    return fit.fit(corrected, take_of(coarse, image, pose, frames))
+    return fit.fit(corrected, take_of(coarse, image, pose, frames), image)
 
 
 def distance_px(mesh_mm, image, f=0):

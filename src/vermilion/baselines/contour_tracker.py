@@ -36,6 +36,12 @@ _LEAST_MOVE_MM = 0.2
 class ContourTracker:
     """A person's tracker with lip shapes; build it once.
 
+    Args:
+        model: the tracker's.
+        lip_displacements_mm: (S, V, 3) of the lip shapes on the person's neutral, head frame.
+        n_samples: of each contour.
+        ridge: cost of a weight that moves the lips by 1 mm.
+
     Attributes:
         displacements_mm: (K, V, 3) of the expressions that move the lips, then of the lip shapes.
         expressions: ids of the former in the model.

@@ -82,7 +82,10 @@ class PosedTake:
         accurate_neutral_mm: np.ndarray,
         correspondence: Correspondence,
     ) -> PosedTake:
-        """Of H `accurate_mm` (F, V_H, 3) and `accurate_neutral_mm` (V_H, 3), world; frames not finite go."""
+        """Of H `accurate_mm` (F, V_H, 3) at `frames` (F,) and `accurate_neutral_mm` (V_H, 3), world.
+
+        Frames that are not finite go.
+        """
         neutral = correspondence.on_coarse(np.asarray(accurate_neutral_mm, dtype=np.float64))
         meshes = correspondence.on_coarse(np.asarray(accurate_mm))
         meshes = align_frames(meshes, neutral, correspondence.rigid, trim=0.2, rounds=2).apply(

@@ -52,7 +52,7 @@ class BoostedDetector(ContourDetector):
         return maps
 
     def arrays(self) -> dict[str, np.ndarray | float]:
-        """All that the detector is, by name."""
+        """All that the detector is, by name: numbers, and arrays (N, ...) of N features or T trees."""
         arrays: dict[str, np.ndarray | float] = {
             "channels": np.array(CHANNELS),
             "interocular_size_px": self.interocular_size_px,
@@ -67,7 +67,7 @@ class BoostedDetector(ContourDetector):
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
-        """Of what `arrays` gave. Raises KeyError where something is missing."""
+        """Of what `arrays` gave, each (N, ...) or (). Raises KeyError where something is missing."""
         forests = {}
         for name in CONTOURS:
             pool = FeaturePool(*(arrays[f"{name}/{part}"] for part in _POOL))

@@ -33,7 +33,7 @@ def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
     gain = 0.18 / max(float(np.median(luminance)), 1e-4)
     lab: np.ndarray = cv2.cvtColor(linear_to_srgb(linear_rgb * gain), cv2.COLOR_RGB2Lab)
     lightness, red = lab[..., 0] / 100.0, lab[..., 1] / 128.0
-    channels = [lightness, 0.5 + lab[..., 1] / 128.0, 0.5 + lab[..., 2] / 128.0]
+    channels: list[np.ndarray] = [lightness, 0.5 + lab[..., 1] / 128.0, 0.5 + lab[..., 2] / 128.0]
     magnitudes, orientations, blobs = [], [], []
     for sigma in SCALES_PX:
         smooth = cv2.GaussianBlur(lightness, (0, 0), sigma)

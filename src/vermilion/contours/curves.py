@@ -30,7 +30,7 @@ def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray
 
 
 def smoothed_ring(values: np.ndarray, passes: int) -> np.ndarray:
-    """(n, ...) values of a closed ring after binomial smoothing."""
+    """The `values` (n, ...) of a closed ring after binomial smoothing."""
     for _ in range(passes):
         values = 0.25 * np.roll(values, 1, axis=0) + 0.5 * values + 0.25 * np.roll(values, -1, 0)
     return values
@@ -59,7 +59,7 @@ def without_crossing(curve: np.ndarray) -> np.ndarray:
 
 
 def distance_across(curve: np.ndarray) -> np.ndarray:
-    """Distance (n,) of each point of a closed curve to the half that it does not belong to."""
+    """Distance (n,) of each point of a closed `curve` (n, 2) to the half that it does not belong to."""
     half = len(curve) // 2
     parts = curve[: half + 1], np.concatenate([curve[half:], curve[:1]])
     away = [cKDTree(other).query(part)[0] for part, other in (parts, parts[::-1])]
@@ -86,7 +86,7 @@ def inward_normals(ring: np.ndarray, apart: int = 1) -> np.ndarray:
 
 
 def outward_normals(curve: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 2) of a closed curve of many points, away from its inside."""
+    """Unit normals (n, 2) of a closed `curve` (n, 2) of many points, away from its inside."""
     return -inward_normals(curve, 4)
 
 

@@ -38,7 +38,7 @@ class ContourDetector(ABC):
         """The mouth's region of a frame, with the rings that the detector starts from.
 
         Args:
-            landmarks_px: (66, 2); lips_px: as in `likelihood`.
+            landmarks_px: (66, 2); lips_px: rings (n, 2), as in `likelihood`.
         """
         lips = lips_px if self.takes_rings else None
         return mouth_region(landmarks_px, self.interocular_size_px, self.margin, lips_px=lips)
@@ -73,12 +73,12 @@ class ContourDetector(ABC):
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray | float]:
-        """All that the detector is, by name: plain arrays and numbers."""
+        """All that the detector is, by name: plain arrays, of whatever shape (n, ...), and numbers."""
 
     @classmethod
     @abstractmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
-        """Of what `arrays` gave. Raises KeyError where something is missing."""
+        """Of what `arrays` gave, each (n, ...) or (). Raises KeyError where something is missing."""
 
     def save(self, path: str | Path) -> None:
         """Write `.npz` of plain arrays, whole or not at all."""

@@ -22,7 +22,7 @@ LABEL_COLOUR = (255, 230, 60)
 
 
 def write_maps(path: str | Path, inner: np.ndarray, outer: np.ndarray) -> None:
-    """Write the maps (h, w) of a frame as half EXR with channels `inner`, `outer`."""
+    """Write the maps of a frame, `inner` and `outer` (h, w), as half EXR with channels of those names."""
     write_channels(path, {"inner": inner, "outer": outer})
 
 
@@ -112,7 +112,7 @@ def maps_overlay(
 
 
 def sheet(images: list[np.ndarray], columns: int = 3) -> np.ndarray:
-    """A contact sheet (H, W, 3) uint8; a grey field where there are no images."""
+    """A contact sheet (H, W, 3) uint8 of `images` (h, w, 3); a grey field where there are none."""
     if not images:
         return np.full((64, 256, 3), 90, dtype=np.uint8)
     return tile(images, columns)

@@ -38,7 +38,7 @@ class FeaturePool:
         return len(self.channel)
 
     def take(self, ids: np.ndarray) -> FeaturePool:
-        """A pool of the features `ids` only."""
+        """A pool of the features `ids` (n,) only."""
         return FeaturePool(self.channel[ids], self.boxes[ids], self.weights[ids])
 
     def evaluate(self, integrals: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:

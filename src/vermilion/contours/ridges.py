@@ -191,12 +191,12 @@ class RidgeDetector(ContourDetector):
         return values
 
     def arrays(self) -> dict[str, np.ndarray | float]:
-        """All that the detector is, by name."""
+        """All that the detector is, by name: numbers, and what was learnt of n samples, (n,) and (n, 3)."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> Self:
-        """Of what `arrays` gave. Raises KeyError where something is missing."""
+        """Of what `arrays` gave, (n,), (n, 3) or (). Raises KeyError where something is missing."""
         values: dict[str, Any] = {field.name: arrays[field.name] for field in fields(cls)}
         return cls(**{k: float(v) if np.ndim(v) == 0 else v for k, v in values.items()})
 

@@ -93,7 +93,7 @@ class CoarseTake:
         """Of frames of a take and their neighbours, which their correction depends on.
 
         Args:
-            face, fit, neutral_mm: as in `of`.
+            face, fit: as in `of`; neutral_mm: (V, 3), head frame.
             coarse, features: files of the chunks that hold them.
             frames: frame numbers, ascending.
             reach: neighbours to either side that are read too, where the files have them.

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def smoothed_over_time(values: np.ndarray, frames: np.ndarray, reach: int) -> np.ndarray:
-    """Values (F, R) at their frames after a local quadratic fit (Savitzky and Golay 1964).
+    """The `values` (F, R) at their frames after a local quadratic fit (Savitzky and Golay 1964).
 
     The filter is symmetric, so nothing comes late, and keeps parabolas as they are, so that the
     peak of a closing mouth stays. Noise of single frames goes: over 7 frames its second difference

@@ -43,6 +43,12 @@ from vermilion.geometry.sparse import CholeskyFactor
 class LayerIntegrator:
     """Integrates correction layers over one topology and neutral; factors on construction.
 
+    Args:
+        neutral_mm: (V, 3) of the person, head frame; triangles: (T, 3).
+        mask: (M,) triangle ids of the layer.
+        seam_mm: width of the soft ring outside the mask.
+        detail_mm: detail finer than this comes from layers, the rest from displacements; 0: layers alone.
+
     Attributes:
         mask: (M,) triangle ids of the layer.
         free: (N,) ids of the vertices that may move.

@@ -68,7 +68,8 @@ def contour_constraints(
     """Each sample projects on its line: point to line in the image, depth free, linearised at the mesh.
 
     Args:
-        vertices_mm: (V, 3) head frame; rotation, translation_mm: its `world_from_head`.
+        vertices_mm: (V, 3) head frame.
+        rotation, translation_mm: (3, 3) and (3,), its `world_from_head`.
         lines: (m, 2) points, (m, 2) normals, (m,) known, of `ImageContours.lines`.
         weight: of a millimetre of contour.
         robust_mm: a point this far off counts half.

@@ -9,7 +9,7 @@ from vermilion.geometry.camera import Camera
 
 
 def distance_to_polyline(points_px: np.ndarray, line_px: np.ndarray, closed: bool) -> np.ndarray:
-    """Distance of points (N, 2) to a polyline (M, 2), (N,) px; NaN vertices of it are left out."""
+    """Distance (N,) px of `points_px` (N, 2) to a polyline `line_px` (M, 2), without its NaN vertices."""
     line = line_px[np.isfinite(line_px).all(axis=1)]
     if len(line) < 2:
         return np.full(len(points_px), np.nan)
@@ -39,7 +39,7 @@ def contour_error(
 
     Args:
         sequence_mm: (F, V, 3) in the camera's world.
-        outer_loop: closed loop of vertices.
+        outer_loop: (L,) vertices of a closed loop.
         occluding: of the same topology; None: the outer contour alone.
         outer_px, inner_px: (F, n, 2) rings in the image; NaN where none was found.
         interocular_px: (F,).

@@ -216,7 +216,7 @@ def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums
 
 
 def sums_by_region(name: str, values: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:
-    """Sums of values (F, V) and of the weights of those known (NaN does not count), by region and clip (F,)."""
+    """Sums of values (F, V) and of the weights of those known (not NaN), by region and `clips` (F,)."""
     sums = {}
     for region, weights in regions.weights.items():
         known, total = weighted_sums(values, weights, clips)

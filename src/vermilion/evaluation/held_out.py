@@ -43,7 +43,7 @@ class Regressed:
     def of(
         cls, model: LipModel, take: CoarseTake, settings: CorrectionSettings, rows: np.ndarray
     ) -> Regressed:
-        """Meshes of the frames `rows` of the take, whose other frames are their neighbours.
+        """Meshes of the frames `rows` (n,) of the take, whose other frames are their neighbours.
 
         The time is that from features to vertices. The factorisation, once a person, and what is compiled
         at the first frame are not in it. NaN where no frame is usable.

@@ -23,9 +23,10 @@ COLUMNS = (
 def sums_of_kinds(
     errors_mm: np.ndarray, kinds: np.ndarray, regions: Regions, clips: np.ndarray
 ) -> ClipSums:
-    """Sums behind the error of each kind of mouth shape, of (F, V) vertex errors.
+    """Sums behind the error of each kind of mouth shape.
 
     Args:
+        errors_mm: (F, V) vertex errors.
         kinds: (F,) of `KINDS`; clips: (F,).
     """
     sums = {}

@@ -65,7 +65,7 @@ def pooled(takes: Sequence[tuple[dict[str, ClipSums], int]]) -> dict[str, Pool]:
 
 
 def ratio_of(sums: ClipSums, above: str, below: str, draws: np.ndarray) -> tuple[float, np.ndarray]:
-    """The ratio of two sums over all clips, and over the clips of each sample (samples, clips)."""
+    """The ratio of two sums over all clips, and over the clips of each sample, `draws` (samples, clips)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = sums.sums[above].sum() / sums.sums[below].sum()
         return float(whole), (draws @ sums.sums[above]) / (draws @ sums.sums[below])

@@ -12,7 +12,7 @@ N_BINS = 3000
 
 
 def histograms(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weight in each bin of `BIN_MM`, a row a frame: (F, V) mm, (V,) -> (F, N_BINS).
+    """Weight in each bin of `BIN_MM`, (F, N_BINS), of `values` (F, V) mm with `weights` (V,).
 
     Values beyond the last bin are counted in it.
     """
@@ -26,7 +26,7 @@ def histograms(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def histogram_quantile(histogram: np.ndarray, q: float) -> np.ndarray:
-    """Quantile in mm of histograms (..., N_BINS), interpolated within the bin."""
+    """Quantile in mm of each `histogram` (..., N_BINS), interpolated within the bin."""
     cumulative = np.cumsum(histogram, axis=-1)
     target = q * cumulative[..., -1:]
     place = np.minimum((cumulative < target).sum(axis=-1, keepdims=True), N_BINS - 1)
@@ -38,7 +38,7 @@ def histogram_quantile(histogram: np.ndarray, q: float) -> np.ndarray:
 
 
 def clips_of(frames: np.ndarray, clip_frames: int, min_clips: int = 1) -> np.ndarray:
-    """Number of the clip of each frame (F,): runs of at most `clip_frames` consecutive frames.
+    """Number (F,) of the clip of each of the `frames` (F,): runs of at most `clip_frames` consecutive frames.
 
     A gap in the frame numbers starts a new clip. Clips are shorter where there are too few frames
     for `min_clips` of them.
@@ -74,7 +74,7 @@ class Resampling:
         return cls(draws, confidence)
 
     def interval(self, values: np.ndarray) -> tuple[float, float]:
-        """Percentile interval of a statistic of each sample (samples,); NaN with under two clips."""
+        """Percentile interval of a statistic's `values` (samples,); NaN with under two clips."""
         values = values[np.isfinite(values)]
         if self.draws.shape[1] < 2 or len(values) == 0:
             return np.nan, np.nan

@@ -33,7 +33,7 @@ class Crop:
     scale: float
 
     def of_image(self, image: np.ndarray) -> np.ndarray:
-        """The part of (h, w, 3) uint8, scaled; grey beyond the image's border."""
+        """The part of an `image` (h, w, 3) uint8, scaled; grey beyond its border."""
         height, width = image.shape[:2]
         result = np.full((self.height, self.width, 3), 60, dtype=np.uint8)
         x0, y0 = max(self.left, 0), max(self.top, 0)

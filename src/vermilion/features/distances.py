@@ -32,7 +32,7 @@ def contour_distances(outer: np.ndarray, inner: np.ndarray, unit: float) -> np.n
 
     Args:
         outer: ring, (n, 2) px or (n, 3) mm, n a multiple of 20.
-        inner: as `outer`; sample k was found from sample k of the outer ring.
+        inner: as `outer`, (n, 2) or (n, 3); sample k was found from sample k of the outer ring.
         unit: inter-ocular distance, as the rings.
 
     Each but the width is the mean over the samples within a twentieth of a half, which halves the

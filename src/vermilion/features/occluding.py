@@ -38,7 +38,7 @@ class OccludingContour:
     triangles: np.ndarray
 
     def on(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """The points (N, 3) on a mesh (V, 3) of the topology, in its frame, mm."""
+        """The points (N, 3) on a mesh `vertices_mm` (V, 3) of the topology, in its frame, mm."""
         return self.points.sample(vertices_mm, self.triangles)
 
     @classmethod

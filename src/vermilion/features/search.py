@@ -124,7 +124,7 @@ def find_inner(
     Args:
         likelihood: (h, w) in [0, 1].
         outer: (n, 2) px or (n, 3) mm, found outer contour.
-        lips: as `outer`, from the samples of the model's outer contour to those of its inner one: where
+        lips: as `outer`, (n, 2) or (n, 3), from the samples of the model's outer contour to those of its inner one: where
             the outer contour is known, the model says how thick the lips are, not where.
         unit: inter-ocular distance, as the rings.
         settings: of the search.

@@ -89,7 +89,7 @@ class LipModel:
         return flat[:, : 9 * len(self.mask)].reshape(len(features), -1, 9)
 
     def mixture(self, features: np.ndarray, neutral_mm: np.ndarray | None = None) -> np.ndarray:
-        """Coefficients (F, R) of the basis, of `features` (F, M); `neutral_mm` as in `predict`."""
+        """Coefficients (F, R) of the basis, of `features` (F, M); `neutral_mm` (V, 3) as in `predict`."""
         return self.estimator.mixture(self._chosen(features, self.person_of(neutral_mm)))
 
     def basis(self, neutral_mm: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
