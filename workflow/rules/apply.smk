@@ -25,17 +25,11 @@ def apply_exports():
         "corrected": P.applied + "/corrected.npy",
         "mesh": P.applied + "/mesh.ply",
         "weights": P.applied + "/weights.csv",
-        "overlay": report(
-            P.apply_overlay,
-            category="Corrected takes",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/overlay.rst",
+        "overlay": in_report(
+            P.apply_overlay, "Corrected takes", "overlay", take="{subject}/{take}"
         ),
-        "timeline": report(
-            P.timeline,
-            category="Corrected takes",
-            labels={"take": "{subject}/{take}, time line"},
-            caption="../report/timeline.rst",
+        "timeline": in_report(
+            P.timeline, "Corrected takes", "timeline", take="{subject}/{take}, time line"
         ),
     }
     if CONFIG.apply.export.usd:
@@ -155,12 +149,7 @@ rule makeup_join:
         videos=per_chunk(P.makeup_chunk + ".mp4"),
         images=per_chunk(P.makeup_chunk + ".png"),
     output:
-        video=report(
-            P.makeup,
-            category="Corrected takes",
-            labels={"take": "{subject}/{take}, make-up"},
-            caption="../report/makeup.rst",
-        ),
+        video=in_report(P.makeup, "Corrected takes", "makeup", take="{subject}/{take}, make-up"),
         image=P.applied + "/makeup.png",
     log:
         P.log("makeup_join", "take"),

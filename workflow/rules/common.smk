@@ -68,6 +68,17 @@ def plain_value(key):
     return value
 
 
+def in_report(path, category, caption, subcategory=None, **labels):
+    """An output that Snakemake's report shows, with the text of `workflow/report/<caption>.rst`."""
+    return report(
+        path,
+        category=category,
+        subcategory=subcategory,
+        labels=labels,
+        caption=f"../report/{caption}.rst",
+    )
+
+
 def code_of(script):
     """Fingerprint of `workflow/scripts/<script>.py` and of all that it imports from the library."""
     return lambda wildcards: fingerprint(SCRIPTS / f"{script}.py")

@@ -203,33 +203,33 @@ rule evaluation_figures:
         maps=P.evaluated + "/maps.npz",
         frames=P.evaluated + "/frames.tsv",
     output:
-        maps=report(
+        maps=in_report(
             P.evaluated + "/error_maps.png",
-            category="Errors",
+            "Errors",
+            "error_maps",
             subcategory="Error maps",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/error_maps.rst",
+            take="{subject}/{take}",
         ),
-        renders=report(
+        renders=in_report(
             P.evaluated + "/renders.png",
-            category="Errors",
+            "Errors",
+            "renders",
             subcategory="Renders",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/renders.rst",
+            take="{subject}/{take}",
         ),
-        stretch=report(
+        stretch=in_report(
             P.evaluated + "/stretch.png",
-            category="Errors",
+            "Errors",
+            "stretch",
             subcategory="Surface stretch",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/stretch.rst",
+            take="{subject}/{take}",
         ),
-        curves=report(
+        curves=in_report(
             P.evaluated + "/curves.png",
-            category="Errors",
+            "Errors",
+            "curves",
             subcategory="Over time",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/curves.rst",
+            take="{subject}/{take}",
         ),
     log:
         P.log("evaluation_figures", "take"),
@@ -258,42 +258,22 @@ rule measures:
         tables=of_takes(P.evaluated + "/measures.tsv", evaluated_takes())
         + of_takes(P.reconstructed + "/measures.tsv", reconstructed_takes()),
     output:
-        measures=report(
-            P.measures,
-            category="Tables",
-            labels={"table": "all measures"},
-            caption="../report/measures.rst",
-        ),
-        kinds=report(
-            P.kinds,
-            category="Tables",
-            labels={"table": "kinds of mouth shapes"},
-            caption="../report/kinds.rst",
-        ),
+        measures=in_report(P.measures, "Tables", "measures", table="all measures"),
+        kinds=in_report(P.kinds, "Tables", "kinds", table="kinds of mouth shapes"),
         seconds=P.seconds,
         comparisons=P.comparisons,
         table2=P.table2,
         table3=P.table3,
         estimators=P.estimators,
-        table1=report(
-            P.table1,
-            category="Tables",
-            labels={"table": "table 1"},
-            caption="../report/table1.rst",
-        ),
-        figure16=report(
+        table1=in_report(P.table1, "Tables", "table1", table="table 1"),
+        figure16=in_report(
             P.figure16,
-            category="Errors",
+            "Errors",
+            "figure16",
             subcategory="Over time",
-            labels={"take": "RBF network against affine map"},
-            caption="../report/figure16.rst",
+            take="RBF network against affine map",
         ),
-        image=report(
-            P.table1_figure,
-            category="Tables",
-            labels={"table": "table 1, image"},
-            caption="../report/table1.rst",
-        ),
+        image=in_report(P.table1_figure, "Tables", "table1", table="table 1, image"),
     log:
         P.log("measures", "run"),
     benchmark:

@@ -257,11 +257,8 @@ rule multiview_report:
         quality=if_tracked(P.multiview_quality),
         drift=if_tracked(P.drift),
     output:
-        page=report(
-            P.multiview_page,
-            category="Reconstruction",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/reconstruction.rst",
+        page=in_report(
+            P.multiview_page, "Reconstruction", "reconstruction", take="{subject}/{take}"
         ),
         drift=P.drift_table,
     log:

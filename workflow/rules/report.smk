@@ -100,12 +100,7 @@ rule quality:
     input:
         tables=quality_files(),
     output:
-        flagged=report(
-            P.quality,
-            category="Tables",
-            labels={"table": "flagged frames"},
-            caption="../report/quality.rst",
-        ),
+        flagged=in_report(P.quality, "Tables", "quality", table="flagged frames"),
     log:
         P.log("quality", "run"),
     benchmark:
@@ -151,12 +146,7 @@ rule summary:
         videos=of_takes(P.apply_overlay, applied_takes()),
         timelines=of_takes(P.timeline, applied_takes()),
     output:
-        page=report(
-            P.summary,
-            category="Summary",
-            labels={"page": "summary"},
-            caption="../report/summary.rst",
-        ),
+        page=in_report(P.summary, "Summary", "summary", page="summary"),
     log:
         P.log("summary", "run"),
     benchmark:

@@ -334,12 +334,7 @@ rule ablations:
     input:
         tables=ablation_tables,
     output:
-        table=report(
-            P.ablations,
-            category="Tables",
-            labels={"table": "refinements of the track"},
-            caption="../report/ablations.rst",
-        ),
+        table=in_report(P.ablations, "Tables", "ablations", table="refinements of the track"),
     log:
         P.log("ablations", "run"),
     benchmark:
