@@ -4,8 +4,8 @@ The studio alone writes truth; besides it, only this file names it, and only its
 """
 
 
-def truth_files(take):
-    """Vertices and triangles of a take's known truth; none where there is none."""
+def truth_files(take, names=("vertices_mm.npy", "triangles.npy")):
+    """Files of a take's known truth; none where there is none."""
     take = take_of(take)
     if take.source == STUDIO:
         folder = Path(fill(P.truth, take))
@@ -13,19 +13,9 @@ def truth_files(take):
         folder = Path(CONFIG.evaluation.truth) / take.name
     else:
         return []
-    files = [folder / "vertices_mm.npy", folder / "triangles.npy"]
+    files = [folder / name for name in names]
     known = take.source == STUDIO or all(path.is_file() for path in files)
     return [str(path) for path in files] if known else []
-
-
-def curve_files(take):
-    """The true expression weights of a take; none where they are not known."""
-    if take.source == STUDIO:
-        return [fill(P.truth, take) + "/weights.json"]
-    if not CONFIG.evaluation.truth:
-        return []
-    path = Path(CONFIG.evaluation.truth) / take.name / "weights.json"
-    return [str(path)] if path.is_file() else []
 
 
 def neutral_truth_files(subject):
@@ -78,8 +68,8 @@ def evaluate_inputs(wildcards):
     if has_truth(take):
         neutral = takes("tattoo", take.subject)[0]
         inputs["truth"] = truth_files(take)
-        if curve_files(take):
-            inputs["curves"] = curve_files(take)[0]
+        if curves := truth_files(take, ["weights.json"]):
+            inputs["curves"] = curves[0]
         inputs["neutral_truth"] = neutral_truth_files(take.subject)
         inputs["neutral_accurate"] = of_chunks(P.accurate, neutral)[0]
     else:

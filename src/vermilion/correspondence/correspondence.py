@@ -91,16 +91,13 @@ class Correspondence:
                 "Remove the file and run again.",
                 path=path,
             )
+        names = ("mask", "rigid", "accurate_triangles", "coarse_triangles", "coarse_neutral_mm")
         return cls(
-            vertices=SurfacePoints(
+            SurfacePoints(
                 arrays["vertex_triangle"], arrays["vertex_barycentric"], arrays["distance_mm"]
             ),
-            triangles=arrays["triangle_triangle"],
-            mask=arrays["mask"],
-            rigid=arrays["rigid"],
-            accurate_triangles=arrays["accurate_triangles"],
-            coarse_triangles=arrays["coarse_triangles"],
-            coarse_neutral_mm=arrays["coarse_neutral_mm"],
+            arrays["triangle_triangle"],
+            **{name: arrays[name] for name in names},
         )
 
 

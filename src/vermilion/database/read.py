@@ -79,18 +79,9 @@ class LipDatabase:
     def read_take(self, subject: str, take: str) -> TakeEntry:
         """All frames of a take."""
         group = self._file[f"takes/{subject}/{take}"]
-        return TakeEntry(
-            subject=subject,
-            take=take,
-            fps=float(group.attrs["fps"]),
-            split=str(group.attrs["split"]),
-            frames=group["frames"][:],
-            features=group["features"][:],
-            layers=group["layers"][:],
-            displacement_mm=group["displacement_mm"][:],
-            valid=group["valid"][:],
-            train=group["train"][:],
-        )
+        arrays = {name: values[:] for name, values in group.items()}
+        fps, split = float(group.attrs["fps"]), str(group.attrs["split"])
+        return TakeEntry(subject, take, fps, split, **arrays)
 
     def training_set(self, subjects: Collection[str]) -> TrainingSet:
         """The valid training frames of some subjects.

@@ -54,14 +54,12 @@ class FeatureTable:
         """
         distances = np.stack([entry.distances for entry in contours])
         found = [[entry.outer_found.mean(), entry.inner_found.mean()] for entry in contours]
+        rings = ("outer_px", "inner_px", "outer_found", "inner_found")
         return cls(
             np.asarray(frames, dtype=np.int64),
             np.concatenate([shape, distances], axis=1),
             feature_names(shape.shape[1], space),
-            np.stack([entry.outer_px for entry in contours]),
-            np.stack([entry.inner_px for entry in contours]),
-            np.stack([entry.outer_found for entry in contours]),
-            np.stack([entry.inner_found for entry in contours]),
+            *(np.stack([getattr(entry, name) for entry in contours]) for name in rings),
             np.asarray(valid, dtype=bool),
             np.asarray(found),
         )

@@ -72,12 +72,8 @@ def temporal_prototypes(sequences: np.ndarray, stride: int, minimum: int = 0) ->
     sequences = np.asarray(sequences)
     stride = max(1, min(stride, len(sequences) // max(minimum, 1)))
     _, label = np.unique(sequences, return_inverse=True)
-    rows = [
-        np.flatnonzero(label == k)[stride // 2 % stride :: stride] for k in range(label.max() + 1)
-    ]
+    first = stride // 2 % stride
+    rows = [np.flatnonzero(label == k) for k in range(label.max() + 1)]
     # A sequence shorter than half a stride still gives its middle frame.
-    rows = [
-        r if len(r) else np.flatnonzero(label == k)[[(label == k).sum() // 2]]
-        for k, r in enumerate(rows)
-    ]
-    return np.sort(np.concatenate(rows))
+    chosen = [r[first::stride] if len(r) > first else r[[len(r) // 2]] for r in rows]
+    return np.sort(np.concatenate(chosen))

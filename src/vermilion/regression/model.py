@@ -106,7 +106,7 @@ class LipModel:
         """How far `features` (F, M) of the person with `neutral_mm` (V, 3) lie from the training, (F,)."""
         return self.estimator.novelty(self._chosen(features, self.person_of(neutral_mm)))
 
-    def check_topology(self, triangles: np.ndarray, path: str | Path | None = None) -> None:
+    def check_topology(self, triangles: np.ndarray) -> None:
         """Raise ModelFileError where a mesh's triangles (T, 3) are not those of the training."""
         found = topology_hash(triangles)
         if found != self.topology:
@@ -114,7 +114,6 @@ class LipModel:
                 f"a mesh of {len(triangles)} triangles with topology {found[:12]}",
                 f"the topology {self.topology[:12]} that {self.name} was trained on",
                 "Track the take with the face model of the training, or train on this one.",
-                path=path,
             )
 
     def _chosen(self, features: np.ndarray, person: int | None) -> np.ndarray:

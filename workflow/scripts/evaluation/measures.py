@@ -41,11 +41,8 @@ def main(snakemake):
     write_table(snakemake.output.table3, table3(summary))
     write_table(snakemake.output.estimators, estimators(curves, summary, configured))
     tables = [read_table(path) for path in snakemake.input.frames]
-    plot_figure16(
-        dict(zip([take["take"] for take in snakemake.params.takes], tables, strict=True)),
-        rbf_and_affine(configured),
-        snakemake.output.figure16,
-    )
+    over_time = dict(zip(names, tables, strict=True))
+    plot_figure16(over_time, rbf_and_affine(configured), snakemake.output.figure16)
     plot_table1(summary, snakemake.output.image)
     print(summary.to_string())
 

@@ -35,15 +35,10 @@ def main(snakemake):
     def named(kind, paths):
         return [(name, Path(path)) for name, path in zip(names[kind], paths, strict=True)]
 
+    tables = ("measures", "table1", "kinds", "comparisons", "table2", "table3", "estimators")
     found = SummaryInputs(
-        measures=read_table(inputs.measures),
-        table1=read_table(inputs.table1),
-        kinds=read_table(inputs.kinds),
+        **{name: read_table(inputs[name]) for name in tables},
         flagged=read_table(inputs.quality),
-        comparisons=read_table(inputs.comparisons),
-        table2=read_table(inputs.table2),
-        table3=read_table(inputs.table3),
-        estimators=read_table(inputs.estimators),
         configured=cfg["training"]["regressor"],
         table1_image=Path(inputs.image),
         figure16=Path(inputs.figure16),
