@@ -12,7 +12,7 @@ and G, the block of A^-1 at the vertices that constraints may name, is made once
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy import sparse
@@ -65,8 +65,7 @@ class LinearConstraints:
         again = np.repeat(self.vertices[:, :1], spare, axis=1)
         vertices = np.concatenate([self.vertices, again], axis=1)
         coefficients = np.pad(self.coefficients, ((0, 0), (0, spare)))
-        return LinearConstraints(vertices, coefficients, self.directions, self.target_mm, self.compliance,
-                    self.one_sided)  # fmt: skip
+        return replace(self, vertices=vertices, coefficients=coefficients)
 
 
 class ConstraintSolver:

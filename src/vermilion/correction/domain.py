@@ -65,6 +65,7 @@ def integration_domain(
     followers = _followers(vertices_mm, triangles, in_mask)
     outside = ~(in_mask | followers)
 
+    others = np.setdiff1d(np.arange(len(triangles)), mask)
     if seam_mm > 0:
         far = _distance_from(vertices_mm, triangles, in_mask | followers)
         free = in_mask | followers | (far < seam_mm)
@@ -72,25 +73,19 @@ def integration_domain(
         hold = np.where(outside, fraction**2 / (1.0 - fraction) ** 2, 0.0)
     else:
         touches_outside = (adjacency(triangles, n_vertices) @ outside.astype(float)) > 0
-        on_border = touches_outside | _on_outer_border(triangles, mask, in_mask, followers)
+        on_border = touches_outside | _on_outer_border(triangles[others], in_mask, followers)
         free = (in_mask & ~on_border) | followers
         hold = np.zeros(n_vertices)
-    others = np.setdiff1d(np.arange(len(triangles)), mask)
     kept = others[free[triangles[others]].any(axis=1)]
     weight = np.where(followers[triangles[kept]].any(axis=1), FOLLOWER_WEIGHT, 1.0)
     ids = np.flatnonzero(free)
     return Domain(ids, triangles[kept], weight, hold[ids])
 
 
-def _on_outer_border(
-    triangles: np.ndarray, mask: np.ndarray, in_mask: np.ndarray, followers: np.ndarray
-) -> np.ndarray:
-    """Mask vertices that also belong to a triangle outside the mask and its followers."""
-    others = np.setdiff1d(np.arange(len(triangles)), mask)
-    corners = triangles[others]
-    corners = corners[~followers[corners].any(axis=1)]
+def _on_outer_border(others: np.ndarray, in_mask: np.ndarray, followers: np.ndarray) -> np.ndarray:
+    """Mask vertices of the `others`, triangles outside the mask, but for those with followers."""
     border = np.zeros(len(in_mask), dtype=bool)
-    border[corners] = True
+    border[others[~followers[others].any(axis=1)]] = True
     return border & in_mask
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from vermilion.evaluation.lips import LipTolerances, aperture_mm, lip_gaps
+from vermilion.evaluation.lips import LipTolerances, aperture_mm
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import histograms
 from vermilion.geometry.closest_points import Surface
+from vermilion.storage.progress import progress
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,12 @@ def surface_errors(
     sequences_mm: dict[str, np.ndarray],
     reference: Reference,
     vertices: np.ndarray,
-    frame_done: Callable[[Iterable], Iterable] = iter,
 ) -> dict[str, np.ndarray]:
     """Distance of each vertex to the nearest point of the reference's surface.
 
     Args:
         sequences_mm: name -> (F, V, 3) in the reference's world.
         vertices: (V,) bool: which vertices to measure; the others are NaN.
-        frame_done: wraps the loop over frames, for progress.
 
     Returns:
         name -> (F, V) mm.
@@ -64,7 +63,7 @@ def surface_errors(
         name: np.full(sequence.shape[:2], np.nan, dtype=np.float32)
         for name, sequence in sequences_mm.items()
     }
-    for frame in frame_done(range(len(reference.vertices_mm))):
+    for frame in progress(range(len(reference.vertices_mm)), "surface errors"):
         surface = Surface(reference.vertices_mm[frame], reference.triangles)
         for name, sequence in sequences_mm.items():
             points = np.asarray(sequence[frame][ids], dtype=np.float64)
@@ -160,25 +159,6 @@ def sums_of_aperture(
         "mouth.false_open": by_clip(gape.astype(float), clips),
     }
     return sums_of_frames("mouth.aperture", difference, clips) + ClipSums(closed)
-
-
-def gaps_in_head(
-    points_mm: np.ndarray,
-    head_rotations: np.ndarray,
-    sides: np.ndarray,
-    columns: np.ndarray,
-) -> np.ndarray:
-    """`lip_gaps` of points in another world.
-
-    Args:
-        points_mm: (F, V, 3) in the world, mm.
-        head_rotations: (F, 3, 3) from it to the head frame.
-        sides, columns: (V,) see `lip_gaps`.
-
-    Returns:
-        (F, columns) mm.
-    """
-    return lip_gaps(np.matmul(points_mm, head_rotations.transpose(0, 2, 1)), sides, columns)
 
 
 def sums_of_motion_errors(

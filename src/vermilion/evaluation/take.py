@@ -11,7 +11,6 @@ import pandas as pd
 from vermilion.evaluation.errors import (
     ClipSums,
     by_clip,
-    gaps_in_head,
     sums_by_region,
     sums_of_aperture,
     sums_of_errors,
@@ -27,6 +26,7 @@ from vermilion.evaluation.lips import (
     aperture_mm,
     columns_of,
     lip_depths,
+    lip_gaps,
 )
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
@@ -35,7 +35,6 @@ from vermilion.evaluation.statistics import clips_of
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import FrameAlignment, align_frames
-from vermilion.storage.progress import progress
 
 
 @dataclass(frozen=True)
@@ -98,15 +97,14 @@ def evaluate_take(
     kinds = _mouth_kinds(model, regions, reference, head, curves)
     clips = clips_of(frames, clip_frames, min_clips)
     sides, columns = lip_sides(model, with_inside=True), columns_of(model)
-    true_gaps = gaps_in_head(reference.points_mm, head.rotations, sides, columns)
-    surface = surface_errors(
-        aligned, reference, regions.used, lambda items: progress(items, "surface errors")
-    )
+    to_head = np.swapaxes(head.rotations, 1, 2)
+    true_gaps = lip_gaps(reference.points_mm @ to_head, sides, columns)
+    surface = surface_errors(aligned, reference, regions.used)
     # A lip vertex that has no counterpart is left out of both gaps.
     columns = np.where(reference.valid, columns, -1)
     sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
-        gaps = gaps_in_head(sequence, head.rotations, sides, columns)
+        gaps = lip_gaps(sequence @ to_head, sides, columns)
         through = lip_depths(sequence, model) > tolerances.through_mm
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
@@ -158,9 +156,7 @@ def evaluate_reconstruction(
     """
     regions = regions.restricted(reference.valid)
     clips = clips_of(frames, clip_frames, min_clips)
-    surface = surface_errors(
-        {"H": sequence_mm}, reference, regions.used, lambda items: progress(items, "H")
-    )["H"]
+    surface = surface_errors({"H": sequence_mm}, reference, regions.used)["H"]
     errors = vertex_errors(sequence_mm, reference)
     shown = Regions({"visible": regions.weights["vermilion"]}, regions.rest)
     hidden = np.where(seen, 0.0, np.nan)

@@ -17,6 +17,7 @@ from vermilion.export.overlay import (
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.storage.errors import InputError
+from vermilion.tracking.result import TrackedTake
 
 _STRIP_HEIGHT = 0.55  # of its width
 
@@ -40,10 +41,7 @@ class Framing:
 def framing(
     model: FaceModel,
     neutral_mm: np.ndarray,
-    rotation: np.ndarray,
-    translation_mm: np.ndarray,
-    valid: np.ndarray,
-    camera: Camera,
+    fit: TrackedTake,
     margin: float,
     height_px: int,
 ) -> Framing:
@@ -51,18 +49,20 @@ def framing(
 
     Args:
         neutral_mm: (V, 3) head frame.
-        rotation, translation_mm, valid: (F, 3, 3), (F, 3), (F,), `world_from_head` of the take.
+        fit: poses and camera of the take.
+        margin: round the face, as a share of its extent.
         height_px: of the face panel.
     """
     lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
 
     def projected(vertices: np.ndarray) -> np.ndarray:
+        rotation, translation_mm = fit.world_from_head_rotation, fit.world_from_head_translation_mm
         posed = neutral_mm[vertices] @ np.swapaxes(rotation, 1, 2) + translation_mm[:, None]
-        pixels = camera.project(posed)
-        pixels[~valid] = np.nan
+        pixels = fit.camera.project(posed)
+        pixels[~fit.valid] = np.nan
         return pixels
 
-    size = (camera.width_px, camera.height_px)
+    size = (fit.camera.width_px, fit.camera.height_px)
     outline = np.flatnonzero(model.regions["face"])[::7]
     face = crop_round(projected(outline), size, margin, height_px)
     width = face.size[0]

@@ -53,15 +53,8 @@ class SearchSettings:
     @classmethod
     def of(cls, section) -> SearchSettings:
         """From the section `features.contours` of the configuration."""
-        return cls(
-            outward=section.reach,
-            inward=section.reach,
-            depth=section.depth,
-            step=section.step,
-            least_likelihood=section.least_likelihood,
-            model_weight=section.model_weight,
-            smooth_weight=section.smooth_weight,
-        )
+        same = ("depth", "step", "least_likelihood", "model_weight", "smooth_weight")
+        return cls(section.reach, section.reach, **{name: getattr(section, name) for name in same})
 
 
 @dataclass(frozen=True)

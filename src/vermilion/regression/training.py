@@ -122,10 +122,8 @@ def train(
     group, _, variant = split_name(name)
     kind, wanted = VARIANTS[variant]
     kind = kind or selection.regressor
-    displacements_mm = data.displacements_mm
     if variant == "paper":
         selection, vertices = selection.as_in_the_paper(), vertices[:0]
-        displacements_mm = displacements_mm[:, :0]
     columns, kinds = _columns(name, feature_names, wanted)
     shifts, neutral_features = _shifts(data, selection)
     features = data.features.astype(np.float64)
@@ -143,7 +141,8 @@ def train(
         persons=persons,
     )  # fmt: skip
     estimator.set_params(**curve.parameters(selection.choice))
-    places = displacements_mm / np.float32(DISPLACEMENT_UNIT_MM)
+    # None of them where the model has no vertices.
+    places = data.displacements_mm[:, : 3 * len(vertices)] / np.float32(DISPLACEMENT_UNIT_MM)
     targets = np.concatenate([data.layers, places], axis=1)
     estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)

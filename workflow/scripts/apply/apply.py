@@ -74,10 +74,7 @@ def main(snakemake):
     write_quality(out.quality, *place, "apply", rows_of_quality)
 
     source, camera = open_frames(params.source, *place), fit.camera
-    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
-    view = framing(
-        tracker, take.neutral_mm, *pose, fit.valid, camera, overlay.margin, overlay.panel_height_px
-    )  # fmt: skip
+    view = framing(tracker, take.neutral_mm, fit, overlay.margin, overlay.panel_height_px)
     images = overlay_frames(
         view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames,
         fit.index_of(frames), take.valid,

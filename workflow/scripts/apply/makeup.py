@@ -45,15 +45,9 @@ def main(snakemake):
     layers = pigments(model, neutral, options)
     makeup = MakeUp(model, neutral, found.light, albedo, layers, options.checker_mm)
     corrected = read_sequence(inputs.corrected)
-    rows, source, camera = (
-        fit.index_of(params.frames),
-        open_frames(params.source, *place),
-        fit.camera,
-    )
-    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
-    crop = framing(
-        model, neutral, *pose, fit.valid, camera, overlay.margin, overlay.panel_height_px
-    ).face
+    rows, camera = fit.index_of(params.frames), fit.camera
+    source = open_frames(params.source, *place)
+    crop = framing(model, neutral, fit, overlay.margin, overlay.panel_height_px).face
     shown = []
 
     def panels(index):
