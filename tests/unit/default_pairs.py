@@ -106,17 +106,6 @@ FUNCTIONS = {
     "contours.training.train_detector": {"seed": "contours.detector.seed"},
     "correction.domain.integration_domain": {"seam_mm": "correction.integration.seam_mm"},
     "correction.integration.LayerIntegrator": {"seam_mm": "correction.integration.seam_mm"},
-    "correspondence.correspondence.find_correspondence": {
-        "mask_radius_mm": "correspondence.mask_radius_mm",
-        "eye_gap_mm": "correspondence.eye_gap_mm",
-        "max_distance_mm": "correspondence.max_distance_mm",
-        "max_angle_deg": "correspondence.max_angle_deg",
-    },
-    "correspondence.neutral.correspond_neutrals": {
-        "landmarks": "correspondence.landmarks",
-        "search_distance_mm": "correspondence.search_distance_mm",
-        "max_distance_mm": "correspondence.max_distance_mm",
-    },
     "database.write.write_database": {
         "min_common_mask": "database.min_common_mask",
         "compression": "database.compression",

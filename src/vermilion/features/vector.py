@@ -56,12 +56,12 @@ class FeatureTable:
         found = [[entry.outer_found.mean(), entry.inner_found.mean()] for entry in contours]
         rings = ("outer_px", "inner_px", "outer_found", "inner_found")
         return cls(
-            np.asarray(frames, dtype=np.int64),
-            np.concatenate([shape, distances], axis=1),
-            feature_names(shape.shape[1], space),
-            *(np.stack([getattr(entry, name) for entry in contours]) for name in rings),
-            np.asarray(valid, dtype=bool),
-            np.asarray(found),
+            frames=np.asarray(frames, dtype=np.int64),
+            features=np.concatenate([shape, distances], axis=1),
+            names=feature_names(shape.shape[1], space),
+            **{name: np.stack([getattr(entry, name) for entry in contours]) for name in rings},
+            valid=np.asarray(valid, dtype=bool),
+            found=np.asarray(found),
         )
 
     def save(self, path: str | Path) -> None:

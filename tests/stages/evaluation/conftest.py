@@ -137,7 +137,7 @@ def evaluate(root, name, truth):
     take, out = root / f"takes/{SUBJECT}/rom", root / f"evaluation/{name}"
     known = [root / f"truth/{SUBJECT}/rom/{part}.npy" for part in ("vertices_mm", "triangles")]
     inputs = take_inputs(root) | {
-        "template": root / "face_model/template.npz",
+        "template": root / "face/template.npz",
         "neutral_of_take": take / "correction/neutral_pair.npz",
         "shapes": root / "evaluation/lip_shapes.npz",
         "layers": [take / f"correction/layers/{c}.npz" for c in CHUNKS],
