@@ -96,7 +96,7 @@ CLASSES = {
 WITHOUT_SECTION = {
     "evaluation.corrected.CoarseTake": "0 switches the integration's steps off",
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
-    "landmarks.appearance.AppearanceSettings": "Mono13's constants for likeness of frames",
+    "landmarks.binary_patterns.PatternSettings": "Mono13's constants for likeness of frames",
     "multiview.neutral.Neutral": "a result: the first take's neutral has not moved",
 }
 

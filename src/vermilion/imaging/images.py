@@ -49,7 +49,7 @@ _UNASSOCIATED["oiio:UnassociatedAlpha"] = 1
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1, [0, 1] -> [0, 1], float32."""
+    """Linear `values` (...,) float32 of sRGB ones (...,), both in [0, 1] (IEC 61966-2-1)."""
     values = np.asarray(values, dtype=np.float32)
     return np.where(
         values <= 0.04045, values / 12.92, ((np.maximum(values, 0) + 0.055) / 1.055) ** 2.4
@@ -63,7 +63,7 @@ _LINEAR_OF_BYTE = srgb_to_linear(np.arange(256, dtype=np.float32) * _BYTE)
 
 
 def linear_to_srgb(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1, clipped to [0, 1], float32."""
+    """sRGB `values` (...,) float32 of linear ones (...,), clipped to [0, 1] (IEC 61966-2-1)."""
     values = np.clip(np.asarray(values, dtype=np.float32), 0.0, 1.0)
     return np.where(
         values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055
@@ -144,7 +144,7 @@ def write_image(path: str | Path, linear: np.ndarray) -> None:
 
 
 def write_srgb8(path: str | Path, pixels: np.ndarray) -> None:
-    """Write (h, w, 3) or (h, w) uint8 as it is (PNG or JPEG)."""
+    """Write `pixels` (h, w, 3) or (h, w) uint8 as they are (PNG or JPEG)."""
     pixels = np.ascontiguousarray(np.atleast_3d(pixels))
     height, width, depth = pixels.shape
     spec = oiio.ImageSpec(width, height, depth, oiio.UINT8)
@@ -154,7 +154,7 @@ def write_srgb8(path: str | Path, pixels: np.ndarray) -> None:
 
 
 def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
-    """Write named (h, w) channels as half-float EXR, zip compressed."""
+    """Write named `channels` (h, w) as half-float EXR, zip compressed."""
     pixels = np.ascontiguousarray(np.stack(list(channels.values()), axis=-1), dtype=np.float32)
     height, width, depth = pixels.shape
     spec = oiio.ImageSpec(width, height, depth, oiio.HALF)

@@ -74,7 +74,7 @@ def landmark_overlay(
 
 
 def draw_landmarks(image: np.ndarray, found: Landmarks) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
+    """A copy of `image` (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
     if not found.found:
         return image
     dense = found.landmark_set is not IBUG66  # large points would hide the face

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.landmarks.appearance import AppearanceSettings, ReferenceShape, describe
+from vermilion.landmarks.binary_patterns import PatternSettings, ReferenceShape, describe
 from vermilion.landmarks.descent import ImageSimilarity
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import N_LANDMARKS
@@ -92,7 +92,7 @@ def find_key_frames(
     read_grey: Callable[[int], np.ndarray],
     track: LandmarkTrack,
     given: Mapping[int, np.ndarray],
-    appearance: AppearanceSettings | None = None,
+    patterns: PatternSettings | None = None,
     settings: KeyFrameSettings | None = None,
 ) -> KeyFrames:
     """Compare all frames of a take with the first that has a face, and choose the key frames.
@@ -102,21 +102,21 @@ def find_key_frames(
         track: detected landmarks of the whole take, without the offset from the given ones.
         given: trusted landmarks (66, 2) by frame number.
     """
-    appearance = appearance or AppearanceSettings()
+    patterns = patterns or PatternSettings()
     points = track.points_px.copy()
     for row, frame in enumerate(track.frames):
         points[row] = given.get(int(frame), points[row])
     has_points = np.isfinite(points).all(axis=(1, 2))
     region, patch = np.full((2, len(points)), np.inf)
     reference = first = None
-    for row in progress(np.flatnonzero(has_points), "appearance"):
+    for row in progress(np.flatnonzero(has_points).tolist(), "likeness"):
         try:
             grey = read_grey(int(track.frames[row]))
         except InputError:
             continue
         if reference is None:
-            reference = ReferenceShape.of(points[row], appearance)
-        look = describe(grey, points[row], reference, appearance)
+            reference = ReferenceShape.of(points[row], patterns)
+        look = describe(grey, points[row], reference, patterns)
         first = first or look
         region[row], patch[row] = first.region_distance(look), first.patch_distance(look)
     is_given = np.isin(track.frames, list(given)) & np.isfinite(region)
@@ -185,6 +185,6 @@ def without_offset(track: LandmarkTrack, given: Mapping[int, np.ndarray]) -> Lan
         off = given[int(track.frames[row])] - track.points_px[row]
         offsets.append(off @ ImageSimilarity.between(track.points_px[row], reference).matrix.T)
     offset, points = np.mean(offsets, axis=0), track.points_px.copy()
-    for row in np.flatnonzero(track.valid):
+    for row in np.flatnonzero(track.valid).tolist():
         points[row] += offset @ ImageSimilarity.between(reference, points[row]).matrix.T
     return replace(track, points_px=points)

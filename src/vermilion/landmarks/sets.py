@@ -92,7 +92,7 @@ class LandmarkSet:
         return np.linalg.norm(corners[..., 0, :] - corners[..., 1, :], axis=-1)
 
     def to_ibug66(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., N, d) as the 66 of `ibug66`, (..., 66, d)."""
+        """`points` (..., N, d) as the 66 of `ibug66`, (..., 66, d)."""
         return points[..., self.ibug66, :]
 
 

@@ -96,17 +96,17 @@ def find_anchor(
     Args:
         load: reads a frame at the reference's resolution; raises InputError if it cannot.
     """
-    window = np.array(window, dtype=np.int64)
+    numbers = np.array(window, dtype=np.int64)
     similarity = similarities(reference, window, load)
     best = choose_anchor(similarity, settings.anchor_similarity)
     if best is None:
-        return Anchor(-1, np.zeros((0, 3)), window, similarity)
-    number = int(window[best])
+        return Anchor(-1, np.zeros((0, 3)), numbers, similarity)
+    number = int(numbers[best])
     frame = load(number)
     levels = [(reference, frame, 2 * settings.length_mm), (reference, frame, settings.length_mm)]
     match = FrameMatchSettings(settings.sigma_px, settings.max_step_mm, settings.min_agreement)
     found = register_frame(levels, reference.vertices_mm, matcher, match)
-    return Anchor(number, found.vertices_mm, window, similarity)
+    return Anchor(number, found.vertices_mm, numbers, similarity)
 
 
 def choose_anchor(similarity: np.ndarray, threshold: float) -> int | None:

@@ -82,7 +82,9 @@ def write_anchor(path: str | Path, anchor: Anchor) -> None:
 def read_anchor(path: str | Path) -> Anchor:
     """What `write_anchor` wrote."""
     arrays = _load(path, ("frame", "vertices_mm", "window", "similarity"))
-    return Anchor(**{**arrays, "frame": int(arrays["frame"])})
+    return Anchor(
+        int(arrays["frame"]), arrays["vertices_mm"], arrays["window"], arrays["similarity"]
+    )
 
 
 def write_clip(path: str | Path, clip: Clip) -> None:

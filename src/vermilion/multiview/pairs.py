@@ -74,7 +74,7 @@ def stereo_pairs(
             "Correct `multiview.stereo.pairs`.",
         )
     if listed:
-        return [tuple(pair) for pair in listed]
+        return [(a, b) for a, b in listed]
     candidates = candidate_pairs(
         cameras,
         target_mm,

@@ -165,7 +165,7 @@ class FlowMatcher:
         smoothness costs half of the accuracy on a tattoo (measured), and the mesh is the better
         regulariser.
         """
-        self._flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._flow.setFinestScale(0)
         self._flow.setPatchStride(4)
         self._flow.setGradientDescentIterations(12)
@@ -174,7 +174,8 @@ class FlowMatcher:
 
     def flow(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Flow (h, w, 2) px with a(x) ~ b(x + flow(x)), of a and b (h, w) uint8."""
-        return self._flow.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), None)
+        a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
+        return self._flow.calc(a, b, None)  # type: ignore[call-overload] # the last may be None
 
     def agreement(
         self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray
@@ -215,7 +216,9 @@ def _along(image: np.ndarray, flow: np.ndarray, border: int) -> np.ndarray:
     height, width = flow.shape[:2]
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     places = np.stack([x, y], axis=-1) + flow
-    return cv2.remap(image, places, None, cv2.INTER_LINEAR, borderMode=border)
+    return cv2.remap(  # type: ignore[call-overload] # the stub wants a second map
+        image, places, None, cv2.INTER_LINEAR, borderMode=border
+    )
 
 
 @dataclass(frozen=True)

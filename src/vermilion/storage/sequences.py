@@ -10,8 +10,6 @@ import numpy as np
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 
-#: Files of one mesh a frame.
-
 
 def write_sequence(path: str | Path, vertices_mm: np.ndarray) -> None:
     """Write `vertices_mm` (F, V, 3) as float32 `.npy`."""
