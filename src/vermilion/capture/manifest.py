@@ -163,12 +163,8 @@ def _check_camera(
     reading: ImageReading = AS_TAGGED,
 ) -> list[str]:
     """Check one camera's images of the chunk, filling the manifest; returns fatal problems."""
-    expected = sizes.get(camera)
-    calibrated = expected is not None
-    if not calibrated:
-        known = [header_size(path, reading) for path in paths.values()]
-        common = Counter(size for size in known if size is not None).most_common(1)
-        expected = common[0][0] if common else None
+    calibrated = sizes.get(camera)
+    expected = calibrated or _common_size(paths, reading)
     facts, bad = {}, {}
     for frame in progress(frames, f"{manifest.subject}/{manifest.take} {camera}"):
         found, reason = check_image(paths.get(frame, source / "missing"), source, expected, reading)
@@ -176,13 +172,14 @@ def _check_camera(
             facts[frame] = found.as_dict()
         if reason:
             bad[frame] = reason
-    if calibrated and len(bad) == len(frames) and _none_fits(paths, expected, reading):
-        width, height = expected
-        found = Counter(header_size(path, reading) for path in paths.values()).most_common(1)
+    given = (
+        [header_size(path, reading) for path in paths.values()] if len(bad) == len(frames) else []
+    )
+    if calibrated and given and calibrated not in given:
         return [
             describe_problem(
-                f"images of {_times(found[0][0])}",
-                f"{width}x{height}, as the calibration says",
+                f"images of {_times(Counter(given).most_common(1)[0][0])}",
+                f"{_times(calibrated)}, as the calibration says",
                 "Calibrate again at this size, or export the frames at the calibrated size.",
                 subject=manifest.subject,
                 take=manifest.take,
@@ -203,8 +200,10 @@ def _check_camera(
     return []
 
 
-def _none_fits(paths: dict[int, Path], expected: tuple[int, int], reading: ImageReading) -> bool:
-    return not any(header_size(path, reading) == expected for path in paths.values())
+def _common_size(paths: dict[int, Path], reading: ImageReading) -> tuple[int, int] | None:
+    """The commonest (width, height) of readable images."""
+    known = [size for path in paths.values() if (size := header_size(path, reading))]
+    return Counter(known).most_common(1)[0][0] if known else None
 
 
 def _times(size: tuple[int, int] | None) -> str:

@@ -18,8 +18,8 @@ def register_to_cloud(
     cloud: Cloud,
     matchable: np.ndarray,
     *,
-    lengths_mm: Sequence[float],
-    gates_mm: Sequence[float],
+    lengths_mm: Sequence[float] | np.ndarray,
+    gates_mm: Sequence[float] | np.ndarray,
     spacing_mm: float,
     min_cosine: float = 0.5,
     slide: float = 0.02,
@@ -31,8 +31,8 @@ def register_to_cloud(
         triangles: (T, 3).
         cloud: in the same world.
         matchable: (V,) bool; others follow the smooth prior.
-        lengths_mm: stiffness of each round (see `solver`), falling.
-        gates_mm: largest distance of a match of each round.
+        lengths_mm: (R,) stiffness of each round (see `solver`), falling.
+        gates_mm: (R,) largest distance of a match of each round.
         spacing_mm: of the cloud; a match that lies to the side by more than twice as much is past
             the cloud's border and dropped.
         min_cosine: smallest cosine between the normals of vertex and point.
