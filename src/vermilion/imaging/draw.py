@@ -11,7 +11,9 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import Hits, RayCaster, interpolate
+from vermilion.imaging.frames import FrameSource
 from vermilion.imaging.images import linear_to_srgb
+from vermilion.storage.errors import InputError
 
 _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
 
@@ -19,6 +21,16 @@ _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
 def to_display(linear: np.ndarray) -> np.ndarray:
     """`linear` RGB (h, w, 3) as sRGB uint8."""
     return np.rint(linear_to_srgb(linear) * 255).astype(np.uint8)
+
+
+def shown_frame(
+    source: FrameSource, camera: str, frame: int, size_px: tuple[int, int] = (320, 240)
+) -> np.ndarray:
+    """A frame as sRGB (h, w, 3) uint8; black of some (width, height) where it cannot be read."""
+    try:
+        return to_display(source.read(camera, frame))
+    except InputError:
+        return np.zeros((size_px[1], size_px[0], 3), dtype=np.uint8)
 
 
 def draw_points(

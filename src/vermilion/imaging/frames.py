@@ -153,6 +153,14 @@ def open_frames(
     )
 
 
+def read_or_none(source: FrameSource, camera: str, frame: int) -> np.ndarray | None:
+    """Linear RGB (h, w, 3) of a frame, None where it cannot be read."""
+    try:
+        return source.read(camera, frame)
+    except InputError:
+        return None
+
+
 def reading_of(source: Source) -> ImageReading:
     """How the image files of a source are read."""
     if not isinstance(source, Mapping):

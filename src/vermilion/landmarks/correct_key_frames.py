@@ -26,7 +26,7 @@ from vermilion.landmarks.flow import FaceFlow
 from vermilion.landmarks.key_frames import BETWEEN, KeyFrames
 from vermilion.landmarks.lip_side import off_lips, onto_lips
 from vermilion.landmarks.scheme import N_LANDMARKS
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 
 
 def settle(
@@ -90,11 +90,7 @@ def _carried(
     found = np.zeros((len(wanted), N_LANDMARKS, 2))
     sure = np.zeros(found.shape[:2])
     last = last_row = None
-    for row in way:
-        try:
-            grey = read_grey(int(track.frames[row]))
-        except InputError:
-            continue
+    for row, grey in readable(way, lambda row: read_grey(int(track.frames[row]))):
         if last is not None:
             flow = engine.between(last, grey, shapes[last_row], shapes[row])
             points, off = flow.carry(points)

@@ -21,7 +21,7 @@ from vermilion.landmarks.scheme import (
     N_LANDMARKS,
     face_size_px,
 )
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -140,11 +140,7 @@ def _clip_points(read_grey, frames, span, shapes, ends, settings):
     """Points (n, 66, 2) and confidence (n, 66) of the rows `span` between two key frames."""
     read, flows, last = [], [], None
     engine = FaceFlow(settings.face_px)
-    for row in progress(span, "flow"):
-        try:
-            grey = read_grey(int(frames[row]))
-        except InputError:
-            continue
+    for row, grey in readable(progress(span, "flow"), lambda row: read_grey(int(frames[row]))):
         if last is not None:
             flows.append(engine.between(last, grey, shapes[read[-1]], shapes[row]))
         last = grey

@@ -5,12 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import KeyFrames
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
-from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
@@ -39,10 +38,7 @@ def correction_overlay(
     images = []
     for row in rows:
         frame = int(corrected.frames[row])
-        try:
-            image = to_display(source.read(camera, frame))
-        except InputError:
-            image = np.zeros((240, 320, 3), dtype=np.uint8)
+        image = shown_frame(source, camera, frame)
         points = corrected.points_px[row]
         before = detected.points_px[np.searchsorted(detected.frames, frame)]
         text = f"{frame}" + (f": key frame ({kinds[frame]})" if frame in kinds else "")

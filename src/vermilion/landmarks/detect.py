@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
@@ -58,10 +58,7 @@ def landmark_overlay(
     images = []
     for row in rows:
         frame = int(track.frames[row])
-        try:
-            image = to_display(source.read(camera, frame))
-        except InputError:
-            image = np.zeros((240, 320, 3), dtype=np.uint8)
+        image = shown_frame(source, camera, frame)
         found = Landmarks(
             track.points_px[row],
             track.confidence[row],

@@ -15,7 +15,7 @@ from vermilion.landmarks.descent import ImageSimilarity
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import N_LANDMARKS
 from vermilion.storage.arrays import read_arrays, write_arrays
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 from vermilion.storage.progress import progress
 
 #: Where a key frame comes from: a person or another tracker; like the neutral; divides a clip.
@@ -109,11 +109,8 @@ def find_key_frames(
     has_points = np.isfinite(points).all(axis=(1, 2))
     region, patch = np.full((2, len(points)), np.inf)
     reference = first = None
-    for row in progress(np.flatnonzero(has_points).tolist(), "likeness"):
-        try:
-            grey = read_grey(int(track.frames[row]))
-        except InputError:
-            continue
+    rows_with_face = progress(np.flatnonzero(has_points).tolist(), "likeness")
+    for row, grey in readable(rows_with_face, lambda row: read_grey(int(track.frames[row]))):
         if reference is None:
             reference = ReferenceShape.of(points[row], patterns)
         look = describe(grey, points[row], reference, patterns)

@@ -19,7 +19,7 @@ from vermilion.multiview.motion import Reference
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.refine import FrameMatchSettings, register_frame
 from vermilion.multiview.views import Frame
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 
 LoadFrame = Callable[[int], Frame]
 
@@ -126,11 +126,7 @@ def similarities(reference: Reference, frames: Sequence[int], load: LoadFrame) -
     views = reference.frame.views
     masks = {name: caster.see(view.camera).hit for name, view in views.items()}
     similarity = np.full(len(frames), np.nan)
-    for index, number in enumerate(frames):
-        try:
-            frame = load(int(number))
-        except InputError:
-            continue
+    for index, frame in readable(range(len(frames)), lambda index: load(int(frames[index]))):
         values = [
             _correlation(views[name].normalised, view.normalised, masks[name])
             for name, view in frame.views.items()

@@ -20,7 +20,7 @@ from vermilion.capture.rig_poses import RigRefinementSettings
 from vermilion.capture.tracks import FeatureMatchSettings, find_features
 from vermilion.config.capture import CalibrationConfig, RigRefinementConfig
 from vermilion.geometry.camera import write_cameras
-from vermilion.imaging.frames import open_frames
+from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import read_image, write_srgb8
 from vermilion.imaging.source import folder_of
 from vermilion.storage.errors import InputError
@@ -89,12 +89,8 @@ def overlay(rig, manifest, neutral, made):
             for name, moment in moments.items()
         }
         return calibration_sheet(rig.calibration, views)
-    source, images = open_frames(manifest.source, manifest.subject, manifest.take), {}
-    for name in rig.cameras:
-        try:
-            images[name] = source.read(name, neutral)
-        except InputError:
-            images[name] = None
+    source = open_frames(manifest.source, manifest.subject, manifest.take)
+    images = {name: read_or_none(source, name, neutral) for name in rig.cameras}
     if made is not None and made.shown and any(p is not None for p in images.values()):
         return refinement_sheet(images, made.shown, made.moved)
     return contact_sheet(images)
