@@ -34,7 +34,7 @@ SIZES = {
     "lip_view_mm": 105.0,
     "video_view_mm": 250.0,
 }
-RAYS = {"n_directions": 64, "n_points": 4}
+RAYS = {"occlusion_directions": 64, "light_samples": 4}
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from vermilion.capture.checks import check_image, header_size
@@ -17,7 +17,7 @@ from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError, describe_problem
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -51,8 +51,7 @@ class Manifest:
     def save(self, path: str | Path) -> None:
         """Write as JSON, sorted, whole or not at all."""
         content = {"format_version": FORMAT_VERSION, **self.__dict__}
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
+        write_text(path, json.dumps(content, indent=1, sort_keys=True) + "\n")
 
 
 def load_manifest(path: str | Path) -> Manifest:
@@ -169,7 +168,7 @@ def _check_camera(
     for frame in progress(frames, f"{manifest.subject}/{manifest.take} {camera}"):
         found, reason = check_image(paths.get(frame, source / "missing"), source, expected, reading)
         if found is not None:
-            facts[frame] = found.as_dict()
+            facts[frame] = asdict(found)
         if reason:
             bad[frame] = reason
     given = (

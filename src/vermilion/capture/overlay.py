@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import cv2
 import numpy as np
 
 from vermilion.capture.calibrate import Calibration
-from vermilion.imaging.draw import draw_points, label, tile, to_display
+from vermilion.imaging.draw import draw_points, label, resized_to_height, tile, to_display
 
 SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 
@@ -26,7 +25,7 @@ def contact_sheet(
             blank = np.full((height_px, height_px, 3), 40, dtype=np.uint8)
             tiles.append(label(blank, f"{name}: cannot be read"))
             continue
-        tiles.append(label(_fitted(to_display(linear), height_px), name))
+        tiles.append(label(resized_to_height(to_display(linear), height_px), name))
     return tile(tiles, min(columns, len(tiles)))
 
 
@@ -50,7 +49,7 @@ def calibration_sheet(
         seen, expected = residuals[moment]
         image = to_display(views[name][moment])
         scale = height_px / image.shape[0]
-        image = _fitted(image, height_px)
+        image = resized_to_height(image, height_px)
         image = draw_points(image, seen * scale, SEEN, 3)
         image = draw_points(image, expected * scale, EXPECTED, 1)
         rms = calibration.camera_reprojection_px[name]
@@ -79,7 +78,7 @@ def refinement_sheet(
         if linear is None or name not in shown:
             continue
         scale = height_px / linear.shape[0]
-        image = _fitted(to_display(linear), height_px)
+        image = resized_to_height(to_display(linear), height_px)
         seen, given, refined = shown[name]
         image = draw_points(image, given * scale, EXPECTED, 2)
         image = draw_points(image, seen * scale, SEEN, 2)
@@ -96,8 +95,3 @@ def worst_view(calibration: Calibration, camera: str) -> str:
     """The moment with the largest reprojection error of a camera."""
     residuals = calibration.residuals[camera]
     return max(residuals, key=lambda m: float(np.abs(residuals[m][0] - residuals[m][1]).max()))
-
-
-def _fitted(image: np.ndarray, height_px: int) -> np.ndarray:
-    width = max(1, round(image.shape[1] * height_px / image.shape[0]))
-    return cv2.resize(image, (width, height_px), interpolation=cv2.INTER_AREA)

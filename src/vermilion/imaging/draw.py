@@ -133,6 +133,12 @@ def label(image: np.ndarray, text: str) -> np.ndarray:
     return image
 
 
+def resized_to_height(image: np.ndarray, height_px: int) -> np.ndarray:
+    """`image` (h, w, 3) uint8 at another height, its pixels averaged."""
+    width = max(1, round(image.shape[1] * height_px / image.shape[0]))
+    return cv2.resize(image, (width, height_px), interpolation=cv2.INTER_AREA)
+
+
 def tile(images: Sequence[np.ndarray], columns: int) -> np.ndarray:
     """`images` (h, w, 3) uint8 of any sizes side by side, scaled to the first one's height."""
     height = images[0].shape[0]

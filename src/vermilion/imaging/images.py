@@ -43,6 +43,8 @@ class ImageReading:
 
 
 AS_TAGGED = ImageReading()
+#: Luminance of linear RGB (ITU-R BT.709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 #: Colours beside an alpha channel are not darkened by it.
 _UNASSOCIATED = oiio.ImageSpec()
 _UNASSOCIATED["oiio:UnassociatedAlpha"] = 1

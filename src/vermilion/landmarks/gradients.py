@@ -5,15 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.imaging.images import linear_to_srgb
+from vermilion.imaging.images import LUMINANCE, linear_to_srgb
 
 N_ORIENTATIONS = 8
-_LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 def grey_of(linear_rgb: np.ndarray) -> np.ndarray:
     """Display brightness (h, w) float32 in [0, 1] of `linear_rgb` (h, w, 3)."""
-    return linear_to_srgb(linear_rgb @ _LUMA)
+    return linear_to_srgb(linear_rgb @ LUMINANCE)
 
 
 def orientation_channels(grey: np.ndarray) -> np.ndarray:

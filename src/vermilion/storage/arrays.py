@@ -19,6 +19,12 @@ def write_arrays(path: str | Path, *, compressed: bool = False, **arrays: Any) -
         (np.savez_compressed if compressed else np.savez)(stream, **arrays)
 
 
+def write_array(path: str | Path, array: np.ndarray) -> None:
+    """Write one `array` (...,) of any shape as `.npy`, whole or not at all."""
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.save(stream, array)
+
+
 def read_arrays(
     path: str | Path,
     what: str,

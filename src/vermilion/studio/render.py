@@ -21,7 +21,7 @@ class Scene:
 
     Attributes:
         triangles: (T, 3) int32 of the studio model.
-        n_directions, n_points: rays of the baking (sky directions, points a light).
+        occlusion_directions, light_samples: rays of the baking (of the sky, of each light).
         edge_samples: rays a pixel where an edge crosses it.
     """
 
@@ -29,8 +29,8 @@ class Scene:
     surface: Surface
     look: Look
     lighting: Lighting
-    n_directions: int = 192
-    n_points: int = 12
+    occlusion_directions: int = 192
+    light_samples: int = 12
     edge_samples: int = 4
 
 
@@ -67,8 +67,8 @@ def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
         normals,
         np.flatnonzero(needed),
         scene.lighting,
-        scene.n_directions,
-        scene.n_points,
+        scene.occlusion_directions,
+        scene.light_samples,
     )
     return {name: _image(scene, view, normals, light) for name, view in views.items()}
 

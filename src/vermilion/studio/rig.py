@@ -25,13 +25,6 @@ LIP_ANGLES_DEG = {
 }
 MULTIVIEW_CAMERAS = (*FACE_ANGLES_DEG, *LIP_ANGLES_DEG)
 VIDEO_CAMERAS = ("cam",)
-STEREO_PAIRS = (
-    ("face0", "face1"),
-    ("face2", "face3"),
-    ("face4", "face5"),
-    ("lip0", "lip1"),
-    ("lip2", "lip3"),
-)
 #: The pair that looks from in front; the first carries the contour labels.
 FRONTAL_PAIR = ("face2", "face3")
 

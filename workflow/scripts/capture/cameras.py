@@ -24,7 +24,7 @@ from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import read_image, write_srgb8
 from vermilion.imaging.source import folder_of
 from vermilion.storage.errors import InputError
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 
@@ -118,8 +118,7 @@ def main(snakemake):
         made = refinement(refine, rig, manifests[0], first, last)
         summary["refinement"] = {"mode": refine.mode, **made.summary()}
     write_srgb8(snakemake.output.overlay, overlay(rig, manifests[0], first, made))
-    with atomic_path(snakemake.output.summary) as temporary:
-        temporary.write_text(json.dumps(summary, indent=1, sort_keys=True) + "\n")
+    write_text(snakemake.output.summary, json.dumps(summary, indent=1, sort_keys=True) + "\n")
     write_cameras(snakemake.output.cameras, made.cameras if made else rig.cameras)
 
 

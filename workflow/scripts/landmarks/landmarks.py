@@ -15,8 +15,8 @@ def main(snakemake):
     cfg, camera = snakemake.params.cfg, snakemake.params.camera
     source = open_frames(snakemake.params.source, subject, take)
     if cfg["landmarks.detector"] == "csv":
-        settings = {k: v for k, v in cfg["landmarks.csv"].items() if k != "path"}
-        find, landmark_set = read_landmark_csv(snakemake.input.csv, **settings).at, IBUG66
+        options = {**cfg["landmarks.csv"], "path": snakemake.input.csv}
+        find, landmark_set = read_landmark_csv(**options).at, IBUG66
     else:
         detector = open_detector(
             cfg["landmarks.detector"], snakemake.params.model, cfg["landmarks.networks"]

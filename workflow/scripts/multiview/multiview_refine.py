@@ -11,7 +11,7 @@ from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
-from vermilion.storage.files import atomic_path
+from vermilion.storage.arrays import write_array
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -44,8 +44,7 @@ def main(snakemake):
         if number in drawn and found.quality.valid:
             shown.append((images.load(number), found))
     write_sequence(snakemake.output.meshes, np.array(meshes))
-    with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
-        np.save(stream, np.array(seeing))
+    write_array(snakemake.output.visibility, np.array(seeing))
     write_quality(snakemake.output.quality, subject, take, "multiview", rows)
     write_srgb8(
         snakemake.output.overlay,

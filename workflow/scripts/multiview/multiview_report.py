@@ -13,7 +13,7 @@ from vermilion.multiview.take import MultiviewImages, RefineSettings
 from vermilion.report.multiview_page import TakeFindings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence, rows_of_frames
@@ -75,8 +75,7 @@ def main(snakemake):
     )
     columns = ["subject", "take", *found.across.columns]
     write_table(snakemake.output.drift, drift if len(drift) else pd.DataFrame(columns=columns))
-    with atomic_path(snakemake.output.page) as temporary:
-        temporary.write_text(report_page(found, shown, report["page_mb"]), encoding="utf-8")
+    write_text(snakemake.output.page, report_page(found, shown, report["page_mb"]))
 
 
 if __name__ == "__main__":
