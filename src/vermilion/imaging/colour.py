@@ -72,10 +72,6 @@ class VideoColour:
     def is_hdr(self) -> bool:
         return self.transfer in ("pq", "hlg")
 
-    def rgb8(self, frame: av.VideoFrame) -> np.ndarray:
-        """Code values (h, w, 3) uint8 R'G'B' of a decoded frame, by matrix and range."""
-        return frame.to_ndarray(**self._format("rgb24"))
-
     def light(self, frame: av.VideoFrame) -> np.ndarray:
         """Linear light (h, w, 3) float32, BT.709 primaries: nits for HDR, else relative to white."""
         codes = frame.to_ndarray(**self._format("rgb48le"))
@@ -92,7 +88,7 @@ class VideoColour:
     def srgb8(self, frame: av.VideoFrame, white_nits: float = 1.0, peak_nits: float = 1.0):
         """The frame as (h, w, 3) uint8 sRGB; white and peak of the clip for HDR."""
         if self.is_plain:
-            return self.rgb8(frame)
+            return frame.to_ndarray(**self._format("rgb24"))
         display = tone_map(self.light(frame), white_nits, peak_nits)
         return np.rint(display * 255.0).astype(np.uint8)
 

@@ -9,7 +9,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 from vermilion.imaging.colour_space import to_linear
-from vermilion.imaging.display_window import display_size, to_display_window
+from vermilion.imaging.display_window import to_display_window
 from vermilion.imaging.exr_layers import choose_layer, layers_of
 from vermilion.imaging.orientation import Orientation, orientation_of_exif
 from vermilion.imaging.pixel_aspect import resample, square_size
@@ -254,7 +254,7 @@ def _square(path: Path, spec: oiio.ImageSpec, place: dict) -> tuple[int, int]:
     """(width, height) with square pixels, not yet turned upright."""
     width, height = spec.width, spec.height
     if path.suffix.lower() == _EXR:
-        width, height = display_size(spec)
+        width, height = spec.full_width, spec.full_height
     if path.suffix.lower() not in _WITH_ASPECT:
         return width, height
     try:

@@ -17,11 +17,8 @@ from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTr
 
 from vermilion.imaging.interlace import deinterlace
 from vermilion.imaging.presentation import Presentation, presentation_of
-from vermilion.imaging.source import VIDEO_SUFFIXES
 from vermilion.storage.errors import InputError, RefusedInputError
 from vermilion.storage.files import atomic_path
-
-__all__ = ["VIDEO_SUFFIXES", "VideoIndex", "VideoReader", "write_video"]
 
 #: Decoded frames that are kept: an interlaced one needs its neighbours.
 _KEPT = 3

@@ -8,7 +8,7 @@ import numpy as np
 
 from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
-from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
+from vermilion.landmarks.detector import Landmarks, LandmarkTrack
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
@@ -41,13 +41,6 @@ def detect_frames(
         rows.append(QualityRow(frame, entry.found, "" if entry.found else reason, confidence))
         entries.append(entry)
     return LandmarkTrack.of(frames, entries), rows
-
-
-def finder(
-    source: FrameSource, camera: str, detector: LandmarkDetector
-) -> Callable[[int], Landmarks]:
-    """The landmarks of a frame, from its image."""
-    return lambda frame: detector.detect(source.read(camera, frame))
 
 
 def landmark_overlay(

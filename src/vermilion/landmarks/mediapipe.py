@@ -11,7 +11,6 @@ import os
 import struct
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -28,21 +27,6 @@ from vermilion.storage.errors import InputError
 MAX_FACES = 4
 _STEPS = 65535
 _DISPLAY = np.rint(linear_to_srgb(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
-
-
-@dataclass(frozen=True)
-class MeshFace:
-    """One face in an image.
-
-    Attributes:
-        points_px: (478, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
-        depth_px: (478,) away from the camera, in the same unit, from an origin near the head's middle.
-        presence: probability that there is a face, [0, 1].
-    """
-
-    points_px: np.ndarray
-    depth_px: np.ndarray
-    presence: float
 
 
 class MediapipeDetector:
@@ -62,14 +46,13 @@ class MediapipeDetector:
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
         """Landmarks of the largest face in `linear_rgb` (h, w, 3) float32."""
         faces = self.faces(linear_rgb)
-        if not faces:
-            return Landmarks.none(self.landmark_set)
-        face = faces[0]
-        confidence = np.full(len(face.points_px), face.presence)
-        return Landmarks(face.points_px, confidence, True, self.landmark_set, face.depth_px)
+        return faces[0] if faces else Landmarks.none(self.landmark_set)
 
-    def faces(self, linear_rgb: np.ndarray, max_faces: int = MAX_FACES) -> list[MeshFace]:
+    def faces(self, linear_rgb: np.ndarray, max_faces: int = MAX_FACES) -> list[Landmarks]:
         """All faces in `linear_rgb` (h, w, 3) float32, the largest first.
+
+        The confidence of all points of a face is the probability that there is a face; depths are
+        from an origin near the head's middle.
 
         Raises:
             InputError: the process of the network ended.
@@ -125,12 +108,13 @@ class MediapipeDetector:
         if self._read(len(mediapipe_runner.MAGIC)) != mediapipe_runner.MAGIC:
             raise self._ended()
 
-    def _face(self) -> MeshFace:
+    def _face(self) -> Landmarks:
         n_points = self.landmark_set.n_points
         values = np.frombuffer(self._read(4 * (1 + 2 * n_points * 3)), "<f4").astype(np.float64)
         points, mirrored = values[1:].reshape(2, n_points, 3)
         mean = 0.5 * (points + mirrored[self.landmark_set.mirror])
-        return MeshFace(mean[:, :2], mean[:, 2], float(np.clip(values[0], 0.0, 1.0)))
+        confidence = np.full(n_points, float(np.clip(values[0], 0.0, 1.0)))
+        return Landmarks(mean[:, :2], confidence, True, self.landmark_set, mean[:, 2])
 
     def _read(self, count: int) -> bytes:
         data = self._answers.read(count)
