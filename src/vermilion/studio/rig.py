@@ -10,12 +10,7 @@ from vermilion.geometry.camera import Camera, look_at, pinhole
 #: Turn about the vertical and height angle of each camera, degrees. Three stereo pairs on the face
 #: (left, front, right), two on the lips (from above, from below).
 FACE_ANGLES_DEG = {
-    "face0": (-32.0, 4.0),
-    "face1": (-22.0, 4.0),
-    "face2": (-5.0, 4.0),
-    "face3": (5.0, 4.0),
-    "face4": (22.0, 4.0),
-    "face5": (32.0, 4.0),
+    f"face{i}": (turn, 4.0) for i, turn in enumerate((-32.0, -22.0, -5.0, 5.0, 22.0, 32.0))
 }
 LIP_ANGLES_DEG = {
     "lip0": (-7.0, 15.0),
