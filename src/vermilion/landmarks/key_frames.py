@@ -65,18 +65,13 @@ class KeyFrames:
         """A row a frame of the take: its distances and, for key frames, what kind they are."""
         kinds = dict(zip(self.frames.tolist(), self.kinds.tolist(), strict=True))
         frames = self.take_frames.tolist()
-        return pd.DataFrame(
-            {
-                "frame": frames,
-                "key_frame": [kinds.get(frame, "") for frame in frames],
-                "region_distance": np.where(
-                    np.isfinite(self.region_distance), self.region_distance, np.nan
-                ),
-                "patch_distance": np.where(
-                    np.isfinite(self.patch_distance), self.patch_distance, np.nan
-                ),
-            }
-        )
+        columns = {
+            "frame": frames,
+            "key_frame": [kinds.get(frame, "") for frame in frames],
+            "region_distance": self.region_distance,
+            "patch_distance": self.patch_distance,
+        }
+        return pd.DataFrame(columns).replace(np.inf, np.nan)
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""

@@ -163,10 +163,7 @@ def _polish_pairs(
 ) -> list[tuple[str, str]]:
     """Pairs of cameras whose images are compared on the surface round a point (3,)."""
     cameras = {name: view.camera for name, view in frame.views.items()}
-    return candidate_pairs(
-        cameras,
-        target_mm,
-        min_angle_deg=settings.polish_min_angle_deg,
-        max_angle_deg=settings.polish_max_angle_deg,
-        max_density_ratio=1.5,
-    ) or stereo_pairs(cameras, target_mm, stereo.pairs)
+    found = candidate_pairs(
+        cameras, target_mm, settings.polish_min_angle_deg, settings.polish_max_angle_deg
+    )
+    return found or stereo_pairs(cameras, target_mm, stereo.pairs)
