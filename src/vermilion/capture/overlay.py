@@ -12,9 +12,7 @@ from vermilion.imaging.draw import draw_points, label, resized_to_height, tile, 
 SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 
 
-def contact_sheet(
-    images: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
-) -> np.ndarray:
+def contact_sheet(images: Mapping[str, np.ndarray | None]) -> np.ndarray:
     """One image a camera with its name, (h, w, 3) uint8.
 
     `images` maps a camera to its image (h, w, 3), linear RGB, or to None, which is drawn as missing.
@@ -22,11 +20,11 @@ def contact_sheet(
     tiles = []
     for name, linear in images.items():
         if linear is None:
-            blank = np.full((height_px, height_px, 3), 40, dtype=np.uint8)
+            blank = np.full((320, 320, 3), 40, dtype=np.uint8)
             tiles.append(label(blank, f"{name}: cannot be read"))
             continue
-        tiles.append(label(resized_to_height(to_display(linear), height_px), name))
-    return tile(tiles, min(columns, len(tiles)))
+        tiles.append(label(resized_to_height(to_display(linear), 320), name))
+    return tile(tiles, min(5, len(tiles)))
 
 
 def calibration_sheet(

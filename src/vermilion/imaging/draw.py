@@ -44,17 +44,13 @@ def draw_points(
 
 
 def draw_polyline(
-    image: np.ndarray,
-    points_px: np.ndarray,
-    colour: Sequence[int],
-    closed: bool = True,
-    width_px: int = 1,
+    image: np.ndarray, points_px: np.ndarray, colour: Sequence[int], closed: bool = True
 ) -> np.ndarray:
     """A copy of `image` (h, w, 3) uint8 with a line through `points_px` (N, 2); NaN is left out."""
     image = np.ascontiguousarray(image).copy()
     points = _fixed(points_px).reshape(-1, 1, 2)
     if len(points):
-        cv2.polylines(image, [points], closed, tuple(colour), width_px, cv2.LINE_AA, _SHIFT)
+        cv2.polylines(image, [points], closed, tuple(colour), 1, cv2.LINE_AA, _SHIFT)
     return image
 
 

@@ -22,8 +22,6 @@ def correction_overlay(
     detected: LandmarkTrack,
     corrected: LandmarkTrack,
     keys: KeyFrames,
-    count: int = 9,
-    columns: int = 3,
 ) -> np.ndarray:
     """Frames of `corrected`, evenly spread, cut to the face; (h, w, 3) uint8.
 
@@ -33,10 +31,9 @@ def correction_overlay(
     Args:
         detected: of the same frames or more.
     """
-    rows = evenly_spaced(len(corrected.frames), count)
     kinds = dict(zip(keys.frames.tolist(), keys.kinds.tolist(), strict=True))
     images = []
-    for row in rows:
+    for row in evenly_spaced(len(corrected.frames), 9):
         frame = int(corrected.frames[row])
         image = shown_frame(source, camera, frame)
         points = corrected.points_px[row]
@@ -55,7 +52,7 @@ def correction_overlay(
                 image = draw_polyline(image, np.stack([a, b]), _DETECTED, closed=False)
             image = draw_points(image, before, _DETECTED, 2)
         images.append(label(draw_points(image, points, _CORRECTED, 2), text))
-    return tile(images, columns)
+    return tile(images, 3)
 
 
 def _square_round(points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:

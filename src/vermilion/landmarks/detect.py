@@ -43,13 +43,10 @@ def detect_frames(
     return LandmarkTrack.of(frames, entries), rows
 
 
-def landmark_overlay(
-    source: FrameSource, camera: str, track: LandmarkTrack, count: int = 8, columns: int = 4
-) -> np.ndarray:
+def landmark_overlay(source: FrameSource, camera: str, track: LandmarkTrack) -> np.ndarray:
     """Frames of a track, evenly spread, with their landmarks; (h, w, 3) uint8."""
-    rows = evenly_spaced(len(track.frames), count)
     images = []
-    for row in rows:
+    for row in evenly_spaced(len(track.frames), 8):
         frame = int(track.frames[row])
         image = shown_frame(source, camera, frame)
         found = Landmarks(
@@ -60,7 +57,7 @@ def landmark_overlay(
         )
         text = f"{frame}" if found.found else f"{frame}: {NOT_FOUND}"
         images.append(label(draw_landmarks(image, found), text))
-    return tile(images, columns)
+    return tile(images, 4)
 
 
 def draw_landmarks(image: np.ndarray, found: Landmarks) -> np.ndarray:

@@ -87,7 +87,6 @@ def find_key_frames(
     read_grey: Callable[[int], np.ndarray],
     track: LandmarkTrack,
     given: Mapping[int, np.ndarray],
-    patterns: PatternSettings | None = None,
     settings: KeyFrameSettings | None = None,
 ) -> KeyFrames:
     """Compare all frames of a take with the first that has a face, and choose the key frames.
@@ -97,7 +96,7 @@ def find_key_frames(
         track: detected landmarks of the whole take, without the offset from the given ones.
         given: trusted landmarks (66, 2) by frame number.
     """
-    patterns = patterns or PatternSettings()
+    patterns = PatternSettings()
     points = track.points_px.copy()
     for row, frame in enumerate(track.frames):
         points[row] = given.get(int(frame), points[row])

@@ -48,8 +48,8 @@ class MediapipeDetector:
         faces = self.faces(linear_rgb)
         return faces[0] if faces else Landmarks.none(self.landmark_set)
 
-    def faces(self, linear_rgb: np.ndarray, max_faces: int = MAX_FACES) -> list[Landmarks]:
-        """All faces in `linear_rgb` (h, w, 3) float32, the largest first.
+    def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
+        """Up to `MAX_FACES` faces in `linear_rgb` (h, w, 3) float32, the largest first.
 
         The confidence of all points of a face is the probability that there is a face; depths are
         from an origin near the head's middle.
@@ -62,7 +62,7 @@ class MediapipeDetector:
         if self._process is None:
             self._start()
         try:
-            self._images.write(struct.pack("<3I", height, width, max_faces))
+            self._images.write(struct.pack("<3I", height, width, MAX_FACES))
             self._images.write(memoryview(pixels).cast("B"))
             self._images.flush()
         except OSError as error:

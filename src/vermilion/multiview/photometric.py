@@ -13,6 +13,9 @@ from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.views import View
 
+#: Cosine of a vertex that faces the camera; how far in front of a vertex the mesh may lie.
+_MIN_COSINE, _TOLERANCE_MM = 0.15, 0.3
+
 
 @dataclass(frozen=True)
 class Sight:
@@ -48,9 +51,6 @@ def sight(
     camera: Camera,
     vertices_mm: np.ndarray,
     normals: np.ndarray | None = None,
-    *,
-    min_cosine: float = 0.15,
-    tolerance_mm: float = 0.3,
 ) -> Sight:
     """Project and test the visibility of a mesh's vertices.
 
@@ -59,16 +59,14 @@ def sight(
         camera: in its world.
         vertices_mm: (V, 3) world, mm.
         normals: (V, 3) unit; None: they are found here.
-        min_cosine: of a vertex that faces the camera.
-        tolerance_mm: how far in front of a vertex the mesh may lie.
     """
     if normals is None:
         normals = vertex_normals(vertices_mm, caster.triangles)
     towards = camera.centre_mm - vertices_mm
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     cosine = (towards * normals).sum(axis=1)
-    visible = cosine > min_cosine
-    visible[visible] = caster.visible(camera, vertices_mm[visible], tolerance_mm)
+    visible = cosine > _MIN_COSINE
+    visible[visible] = caster.visible(camera, vertices_mm[visible], _TOLERANCE_MM)
     return Sight(camera.project(vertices_mm), visible, cosine)
 
 
