@@ -118,7 +118,7 @@ class RenderedPair:
             write_images(
                 plan, frontal, capture, missing, 0, name="p1/rom", seed=seed,
                 noise_read=studio.noise_read, noise_shot=studio.noise_shot,
-                n_directions=studio.occlusion_directions, n_points=studio.light_samples,
+                occlusion_directions=studio.occlusion_directions, light_samples=studio.light_samples,
                 edge_samples=studio.edge_samples,
             )  # fmt: skip
 

@@ -124,7 +124,7 @@ def test_chunks_change_no_bit(capture, tmp_path):
 
 def test_a_frame_is_read_once_and_its_mesh_is_one_ray_caster(capture, tmp_path, monkeypatch):
     reads, meshes, converted = Counter(), Counter(), Counter()
-    counted(monkeypatch, "read_image", lambda path, **_: reads.update([str(path)]))
+    counted(monkeypatch, "read_image", lambda path, *_, **__: reads.update([str(path)]))
     counted(monkeypatch, "linear_to_srgb", lambda x: converted.update(image_bytes(x)))
     whole = RayCaster.__init__
 
@@ -142,7 +142,7 @@ def test_a_frame_is_read_once_and_its_mesh_is_one_ray_caster(capture, tmp_path, 
 
 def test_the_reference_bakes_each_view_once(capture, tmp_path, monkeypatch):
     reads, weighed = Counter(), Counter()
-    counted(monkeypatch, "read_image", lambda path, **_: reads.update([str(path)]))
+    counted(monkeypatch, "read_image", lambda path, *_, **__: reads.update([str(path)]))
     counted(monkeypatch, "_view_weight", lambda *args: weighed.update([args[2].name]))
     reference_of(capture, tmp_path)
     assert set(reads.values()) == {1}

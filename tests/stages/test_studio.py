@@ -21,20 +21,13 @@ from vermilion.studio.capture_writer import (
 )
 from vermilion.studio.labels import label_frames, lip_contours, view_mouth
 from vermilion.studio.render import render
+from vermilion.studio.rig import RigSettings
 from vermilion.studio.surface import surface_of
 from vermilion.studio.take import cameras_of, plan_take
 from vermilion.studio.take_settings import take_settings
 
-SIZES = {
-    "camera_distance_mm": 735.0,
-    "face_size_px": (200, 200),
-    "lip_size_px": (240, 200),
-    "video_size_px": (240, 200),
-    "face_view_mm": 245.0,
-    "lip_view_mm": 105.0,
-    "video_view_mm": 250.0,
-}
-RAYS = {"n_directions": 64, "n_points": 4}
+SIZES = RigSettings(735.0, (200, 200), (240, 200), (240, 200), 245.0, 105.0, 250.0)
+RAYS = {"occlusion_directions": 64, "light_samples": 4}
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +75,7 @@ def rom(model):
 
 @pytest.fixture(scope="module")
 def cameras(rom):
-    return cameras_of(rom, "tattoo", **SIZES)
+    return cameras_of(rom, "tattoo", SIZES)
 
 
 def images(take, surface, cameras, index=0):
@@ -228,7 +221,7 @@ def test_truth_has_the_form_of_the_sample_captures(model, rom, tmp_path):
 def test_people_differ_from_frame_to_frame(model, surface):
     crowd = plan(model, role="video", last=3, performance="people")
     assert len(np.unique(crowd.identities[:, 0])) == 4
-    cameras = cameras_of(crowd, "video", **SIZES)
+    cameras = cameras_of(crowd, "video", SIZES)
     shown = [images(crowd, surface, cameras, index=i)["cam"] for i in range(2)]
     assert np.abs(shown[0] - shown[1]).mean() > 0.02
     for index in range(4):

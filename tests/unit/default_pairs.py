@@ -59,9 +59,9 @@ CLASSES = {
         {"outward": "features.contours.reach", "inward": "features.contours.reach"},
         {"floor": "keeps the logarithm of a likelihood finite"},
     ),
-    "inpaint.opening.Evidence": Pair(("inpaint.opening",)),
-    "inpaint.paint.Paint": Pair(("inpaint.composite", "inpaint.domain", "inpaint.shading")),
-    "inpaint.shading.Shading": Pair(("inpaint.shading",)),
+    "inpaint.frame.InpaintInputs": Pair(("inpaint.composite", "inpaint.domain", "inpaint.shading")),
+    "inpaint.opening.OpeningSettings": Pair(("inpaint.opening",)),
+    "inpaint.shading.ShadingSettings": Pair(("inpaint.shading",)),
     "landmarks.correction.CorrectionSettings": Pair(
         ("landmarks.correction",),
         unset={"fill_confidence": "confidence of a landmark that no frame detected"},
@@ -69,11 +69,9 @@ CLASSES = {
     "landmarks.key_frames.KeyFrameSettings": Pair(("landmarks.key_frames",)),
     "landmarks.networks.NetworkSettings": Pair(("landmarks.networks",)),
     "landmarks.training.TrainingSettings": Pair(("landmarks.training",)),
+    "multiview.refine.FrameMatchSettings": Pair(("multiview.refine",)),
     "regression.training.Selection": Pair(("training",)),
-    "studio.render.Stage": Pair(
-        ("studio",),
-        {"n_directions": "studio.occlusion_directions", "n_points": "studio.light_samples"},
-    ),
+    "studio.render.Scene": Pair(("studio",)),
     "tracking.identity.colour_residuals.IdentityImageSettings": Pair(("tracking.identity.images",)),
     "tracking.identity.landmark_identity.IdentitySettings": Pair(
         ("tracking.identity",),
@@ -94,7 +92,10 @@ CLASSES = {
 #: Classes with a number as a default that no configuration sets.
 WITHOUT_SECTION = {
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
-    "landmarks.appearance.AppearanceSettings": "Mono13's constants for likeness of frames",
+    "imaging.colour.VideoColour": "tags of a file: sRGB where there are none",
+    "imaging.presentation.Presentation": "tags of a file: upright and square where there are none",
+    "landmarks.binary_patterns.PatternSettings": "Mono13's constants for likeness of frames",
+    "multiview.motion.SolveSettings": "bounds of the solver, which the coarse track lowers",
     "multiview.neutral.Neutral": "a result: the first take's neutral has not moved",
 }
 
@@ -135,7 +136,6 @@ FUNCTIONS = {
     },
     "geometry.surface_points.closest_on_surface": {"max_angle_deg": "correspondence.max_angle_deg"},
     "inpaint.bake.bake": {"edge_mm": "inpaint.domain.edge_mm"},
-    "inpaint.composite.render_layer": {"samples": "inpaint.composite.samples"},
     "inpaint.tattoo.tattoo_mask": {"closing_mm": "inpaint.mask.closing_mm"},
     "landmarks.flow.FaceFlow": {"face_px": "landmarks.correction.face_px"},
     "landmarks.table.read_landmark_csv": {
@@ -145,10 +145,6 @@ FUNCTIONS = {
     },
     "multiview.photometric.motion_at": {"min_agreement": "multiview.track.min_agreement"},
     "multiview.photometric.measure_motion": {"min_agreement": "multiview.track.min_agreement"},
-    "multiview.refine.register_frame": {
-        "stride_px": "multiview.refine.ray_stride_px",
-        "cloud_gate_mm": "multiview.refine.cloud_gate_mm",
-    },
     "regression.cross_validation.cross_validate": {"n_folds": "training.folds"},
     "regression.kernel.KernelRegressor": {
         "linear": "training.kernel_linear",
@@ -156,7 +152,7 @@ FUNCTIONS = {
         "equalise": "training.kernel_equalise",
     },
     "scan.personal.personal_model": {"finest_mm": "scan:finest_mm"},
-    "studio.lighting.bake": {
+    "studio.lighting.bake_light": {
         "n_directions": "studio.occlusion_directions",
         "n_points": "studio.light_samples",
     },
@@ -168,18 +164,5 @@ FUNCTIONS = {
         "intensity": "studio.intensity",
         "n_poses": "studio_take:poses",
         "pose_seconds": "studio_take:pose_seconds",
-    },
-    "studio.take.plan_take": {
-        "performance": "studio_take:performance",
-        "poses": "studio_take:poses",
-        "pose_seconds": "studio_take:pose_seconds",
-        "csv_first": "studio_take:csv_first",
-        "csv_fps": "studio_take:csv_fps",
-        "lights": "studio_take:lights",
-        "slight_open": "studio.slight_open",
-        "ease_in_frames": "studio.ease_in_frames",
-        "intensity": "studio.intensity",
-        "head_turn_deg": "studio.head_turn_deg",
-        "head_shift_mm": "studio.head_shift_mm",
     },
 }  # fmt: skip

@@ -88,7 +88,6 @@ def test_the_points_of_ibug66_are_those_of_the_mesh_in_an_image_and_its_mirror_i
     ids = MEDIAPIPE478.ibug66
     assert (MEDIAPIPE478.mirror[ids][MIRROR] == ids).all()
     points = np.random.default_rng(0).normal(size=(2, 478, 2))
-    assert (MEDIAPIPE478.to_ibug66(points) == points[:, ids]).all()
     assert (MEDIAPIPE478.interocular_px(points) == IBUG66.interocular_px(points[:, ids])).all()
 
 

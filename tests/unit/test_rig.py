@@ -7,6 +7,8 @@ from tests.heads import small_tracker
 from vermilion.geometry.camera import read_cameras, write_cameras
 from vermilion.studio import rig
 
+SETTINGS = rig.RigSettings(735.0, (512, 512), (480, 384), (640, 480), 245.0, 105.0, 250.0)
+
 
 @pytest.fixture(scope="module")
 def face():
@@ -15,12 +17,13 @@ def face():
 
 @pytest.fixture(scope="module")
 def cameras(face):
-    return rig.lips16_rig(face, face.neutral_mm, 735.0, (512, 512), (480, 384), 245.0, 105.0)
+    return rig.lips16_rig(face, face.neutral_mm, SETTINGS)
 
 
 def test_three_pairs_on_the_face_and_two_on_the_lips(cameras):
     assert len(cameras) == 10
-    for left, right in rig.STEREO_PAIRS:
+    names = list(cameras)
+    for left, right in zip(names[::2], names[1::2], strict=True):
         a, b = cameras[left], cameras[right]
         baseline = np.linalg.norm(a.centre_mm - b.centre_mm)
         assert 80 < baseline < 260  # mm
@@ -50,9 +53,7 @@ def test_every_camera_sees_what_it_is_for(face, cameras):
 
 def test_the_rig_follows_the_actor(face, cameras):
     shift = np.array([12.0, -7.0, 5.0])
-    moved = rig.lips16_rig(
-        face, face.neutral_mm + shift, 735.0, (512, 512), (480, 384), 245.0, 105.0
-    )
+    moved = rig.lips16_rig(face, face.neutral_mm + shift, SETTINGS)
     for name, camera in cameras.items():
         assert np.allclose(moved[name].centre_mm - camera.centre_mm, shift)
 

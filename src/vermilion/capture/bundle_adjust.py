@@ -27,6 +27,20 @@ def triangulate_tracks(cameras: Mapping[str, Camera], tracks: Tracks) -> np.ndar
     return np.linalg.solve(left + 1e-12 * np.eye(3), right[..., None])[..., 0]
 
 
+def adjustment_options(
+    loss_px: float, iterations: int, tolerance: float
+) -> pycolmap.BundleAdjustmentOptions:
+    """COLMAP's options of a robust adjustment in one thread: the sums' order decides last digits."""
+    options = pycolmap.BundleAdjustmentOptions()
+    options.print_summary = False
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
+    options.ceres.loss_function_scale = loss_px
+    options.ceres.solver_options.num_threads = 1
+    options.ceres.solver_options.max_num_iterations = iterations
+    options.ceres.solver_options.function_tolerance = tolerance
+    return options
+
+
 def bundle_adjust(
     cameras: Mapping[str, Camera],
     tracks: Tracks,
@@ -59,16 +73,10 @@ def bundle_adjust(
     """
     seen = np.flatnonzero(tracks.per_camera())
     model = _reconstruction(cameras, tracks, points_mm, seen)
-    options = pycolmap.BundleAdjustmentOptions()
+    options = adjustment_options(loss_px, iterations=100, tolerance=1e-9)
     options.refine_focal_length = free_focal and free_poses
     options.refine_extra_params = options.refine_principal_point = False
     options.refine_rig_from_world = free_poses
-    options.print_summary = False
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
-    options.ceres.loss_function_scale = loss_px
-    options.ceres.solver_options.num_threads = 1
-    options.ceres.solver_options.max_num_iterations = 100
-    options.ceres.solver_options.function_tolerance = 1e-9
     config = pycolmap.BundleAdjustmentConfig()
     for i in seen:
         config.add_image(int(i) + 1)

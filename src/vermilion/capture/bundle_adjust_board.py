@@ -13,6 +13,7 @@ import numpy as np
 import pycolmap
 
 from vermilion.capture.board import Corners
+from vermilion.capture.bundle_adjust import adjustment_options
 
 
 @dataclass(frozen=True)
@@ -50,15 +51,9 @@ def bundle_adjust_board(
         refine_principal_point: whether the principal point is estimated.
     """
     model, ids = _reconstruction(estimate, reference, seen, corners_mm)
-    options = pycolmap.BundleAdjustmentOptions()
+    options = adjustment_options(1.0, iterations=200, tolerance=1e-10)
     options.refine_points3D = False
     options.refine_principal_point = refine_principal_point
-    options.print_summary = False
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.SOFT_L1
-    options.ceres.loss_function_scale = 1.0
-    options.ceres.solver_options.num_threads = 1  # the sums' order decides the last digits
-    options.ceres.solver_options.max_num_iterations = 200
-    options.ceres.solver_options.function_tolerance = 1e-10
     config = pycolmap.BundleAdjustmentConfig()
     for image_id in model.images:
         config.add_image(image_id)

@@ -97,8 +97,12 @@ def calibrate_rig(
         )
     estimate = _chained_poses(cameras, boards, reference, place)
     estimate = bundle_adjust_board(estimate, reference, seen, corners, free_centre)
-    rms_of = _view_rms(estimate, seen, corners)
-    bad = {key for key, rms in rms_of.items() if rms > settings.max_view_px}
+    bad = {
+        (name, moment)
+        for name, views in _residuals(estimate, seen, corners).items()
+        for moment, (found, expected) in views.items()
+        if _rms(expected - found) > settings.max_view_px
+    }
     if bad:
         dropped += sorted(bad)
         seen = {
@@ -213,15 +217,16 @@ def _inverse(pose: np.ndarray) -> np.ndarray:
     return np.concatenate([rotation, (-rotation @ pose[:, 3])[:, None]], axis=1)
 
 
-def _view_rms(
+def _residuals(
     estimate: RigEstimate, seen: BoardViews, corners: np.ndarray
-) -> dict[tuple[str, str], float]:
+) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """`Calibration.residuals`."""
     return {
-        (name, moment): _rms(
-            reprojection(estimate, name, moment, corners[view.ids]) - view.points_px
-        )
+        name: {
+            moment: (view.points_px, reprojection(estimate, name, moment, corners[view.ids]))
+            for moment, view in views.items()
+        }
         for name, views in seen.items()
-        for moment, view in views.items()
     }
 
 
@@ -235,13 +240,7 @@ def _calibration(
     corners: np.ndarray,
     dropped: tuple[tuple[str, str], ...],
 ) -> Calibration:
-    residuals = {
-        name: {
-            moment: (view.points_px, reprojection(estimate, name, moment, corners[view.ids]))
-            for moment, view in views.items()
-        }
-        for name, views in seen.items()
-    }
+    residuals = _residuals(estimate, seen, corners)
     differences = {
         name: np.concatenate([expected - found for found, expected in views.values()])
         for name, views in residuals.items()

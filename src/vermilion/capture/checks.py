@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import OpenImageIO as oiio
@@ -31,9 +31,6 @@ class ImageFacts:
     height_px: int
     channels: int
     bits: int
-
-    def as_dict(self) -> dict:
-        return asdict(self)
 
 
 def check_image(

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from vermilion.capture.checks import check_image, header_size
@@ -17,7 +17,7 @@ from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError, describe_problem
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -51,8 +51,7 @@ class Manifest:
     def save(self, path: str | Path) -> None:
         """Write as JSON, sorted, whole or not at all."""
         content = {"format_version": FORMAT_VERSION, **self.__dict__}
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
+        write_text(path, json.dumps(content, indent=1, sort_keys=True) + "\n")
 
 
 def load_manifest(path: str | Path) -> Manifest:
@@ -163,26 +162,23 @@ def _check_camera(
     reading: ImageReading = AS_TAGGED,
 ) -> list[str]:
     """Check one camera's images of the chunk, filling the manifest; returns fatal problems."""
-    expected = sizes.get(camera)
-    calibrated = expected is not None
-    if not calibrated:
-        known = [header_size(path, reading) for path in paths.values()]
-        common = Counter(size for size in known if size is not None).most_common(1)
-        expected = common[0][0] if common else None
+    calibrated = sizes.get(camera)
+    expected = calibrated or _common_size(paths, reading)
     facts, bad = {}, {}
     for frame in progress(frames, f"{manifest.subject}/{manifest.take} {camera}"):
         found, reason = check_image(paths.get(frame, source / "missing"), source, expected, reading)
         if found is not None:
-            facts[frame] = found.as_dict()
+            facts[frame] = asdict(found)
         if reason:
             bad[frame] = reason
-    if calibrated and len(bad) == len(frames) and _none_fits(paths, expected, reading):
-        width, height = expected
-        found = Counter(header_size(path, reading) for path in paths.values()).most_common(1)
+    given = (
+        [header_size(path, reading) for path in paths.values()] if len(bad) == len(frames) else []
+    )
+    if calibrated and given and calibrated not in given:
         return [
             describe_problem(
-                f"images of {_times(found[0][0])}",
-                f"{width}x{height}, as the calibration says",
+                f"images of {_times(Counter(given).most_common(1)[0][0])}",
+                f"{_times(calibrated)}, as the calibration says",
                 "Calibrate again at this size, or export the frames at the calibrated size.",
                 subject=manifest.subject,
                 take=manifest.take,
@@ -203,8 +199,10 @@ def _check_camera(
     return []
 
 
-def _none_fits(paths: dict[int, Path], expected: tuple[int, int], reading: ImageReading) -> bool:
-    return not any(header_size(path, reading) == expected for path in paths.values())
+def _common_size(paths: dict[int, Path], reading: ImageReading) -> tuple[int, int] | None:
+    """The commonest (width, height) of readable images."""
+    known = [size for path in paths.values() if (size := header_size(path, reading))]
+    return Counter(known).most_common(1)[0][0] if known else None
 
 
 def _times(size: tuple[int, int] | None) -> str:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import cv2
 import numpy as np
 
 from vermilion.capture.calibrate import Calibration
-from vermilion.imaging.draw import draw_points, label, tile, to_display
+from vermilion.imaging.draw import draw_points, label, resized_to_height, tile, to_display
 
 SEEN, EXPECTED, REFINED = (60, 220, 60), (255, 60, 60), (60, 120, 255)
 
 
-def contact_sheet(
-    images: Mapping[str, np.ndarray | None], height_px: int = 320, columns: int = 5
-) -> np.ndarray:
+def contact_sheet(images: Mapping[str, np.ndarray | None]) -> np.ndarray:
     """One image a camera with its name, (h, w, 3) uint8.
 
     `images` maps a camera to its image (h, w, 3), linear RGB, or to None, which is drawn as missing.
@@ -23,11 +20,11 @@ def contact_sheet(
     tiles = []
     for name, linear in images.items():
         if linear is None:
-            blank = np.full((height_px, height_px, 3), 40, dtype=np.uint8)
+            blank = np.full((320, 320, 3), 40, dtype=np.uint8)
             tiles.append(label(blank, f"{name}: cannot be read"))
             continue
-        tiles.append(label(_fitted(to_display(linear), height_px), name))
-    return tile(tiles, min(columns, len(tiles)))
+        tiles.append(label(resized_to_height(to_display(linear), 320), name))
+    return tile(tiles, min(5, len(tiles)))
 
 
 def calibration_sheet(
@@ -50,7 +47,7 @@ def calibration_sheet(
         seen, expected = residuals[moment]
         image = to_display(views[name][moment])
         scale = height_px / image.shape[0]
-        image = _fitted(image, height_px)
+        image = resized_to_height(image, height_px)
         image = draw_points(image, seen * scale, SEEN, 3)
         image = draw_points(image, expected * scale, EXPECTED, 1)
         rms = calibration.camera_reprojection_px[name]
@@ -79,7 +76,7 @@ def refinement_sheet(
         if linear is None or name not in shown:
             continue
         scale = height_px / linear.shape[0]
-        image = _fitted(to_display(linear), height_px)
+        image = resized_to_height(to_display(linear), height_px)
         seen, given, refined = shown[name]
         image = draw_points(image, given * scale, EXPECTED, 2)
         image = draw_points(image, seen * scale, SEEN, 2)
@@ -96,8 +93,3 @@ def worst_view(calibration: Calibration, camera: str) -> str:
     """The moment with the largest reprojection error of a camera."""
     residuals = calibration.residuals[camera]
     return max(residuals, key=lambda m: float(np.abs(residuals[m][0] - residuals[m][1]).max()))
-
-
-def _fitted(image: np.ndarray, height_px: int) -> np.ndarray:
-    width = max(1, round(image.shape[1] * height_px / image.shape[0]))
-    return cv2.resize(image, (width, height_px), interpolation=cv2.INTER_AREA)

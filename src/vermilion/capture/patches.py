@@ -18,6 +18,10 @@ from vermilion.capture.tracks import Tracks
 from vermilion.geometry.camera import Camera
 
 Greys = Mapping[int, Mapping[str, np.ndarray]]  # frame -> camera -> (h, w) float32
+#: Nearest points that determine a tangent plane, and Gauss-Newton steps of an alignment.
+_NEIGHBOURS, _ROUNDS = 12, 10
+#: Observations whose patch moves farther, or whose patches correlate less, are dropped.
+_MAX_SHIFT_PX, _MIN_CORRELATION = 2.0, 0.8
 
 
 def align_patches(
@@ -27,10 +31,6 @@ def align_patches(
     greys: Greys,
     *,
     radius_px: int = 8,
-    neighbours: int = 12,
-    rounds: int = 10,
-    max_shift_px: float = 2.0,
-    min_correlation: float = 0.8,
 ) -> Tracks:
     """The tracks with every observation aligned to that of the most frontal camera.
 
@@ -40,12 +40,8 @@ def align_patches(
         points_mm: (P, 3) of the tracks, world.
         greys: the images.
         radius_px: half the width of a patch.
-        neighbours: nearest points that determine a tangent plane.
-        rounds: Gauss-Newton steps of the alignment.
-        max_shift_px: observations whose patch moves farther are dropped.
-        min_correlation: observations whose patches correlate less are dropped.
     """
-    normals = _normals(tracks, points_mm, neighbours)
+    normals = _normals(tracks, points_mm)
     towards = np.stack([cameras[n].centre_mm for n in tracks.cameras])[tracks.camera]
     towards = towards - points_mm[tracks.track]
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
@@ -67,23 +63,22 @@ def align_patches(
             cameras[a], cameras[b], greys[frame][a], tracks.pixels[at],
             points_mm[tracks.track[rows]], normals[tracks.track[rows]], radius_px,
         )  # fmt: skip
-        shift, correlation = _shifts(greys[frame][b], where, patch, rounds, max_shift_px)
+        shift, correlation = _shifts(greys[frame][b], where, patch)
         middle = where.shape[1] // 2
         pixels[rows] = where[:, middle] + shift
-        good[rows] = (correlation >= min_correlation) & (
-            np.linalg.norm(shift, axis=1) < max_shift_px
-        )
+        near = np.linalg.norm(shift, axis=1) < _MAX_SHIFT_PX
+        good[rows] = (correlation >= _MIN_CORRELATION) & near
     return replace(tracks, pixels=pixels).kept(good)
 
 
-def _normals(tracks: Tracks, points_mm: np.ndarray, neighbours: int) -> np.ndarray:
+def _normals(tracks: Tracks, points_mm: np.ndarray) -> np.ndarray:
     """Unit normal (P, 3), up to its sign, of the plane through the nearest points of the frame."""
     frames = np.zeros(len(points_mm), dtype=int)
     frames[tracks.track] = tracks.frame
     normals = np.zeros_like(points_mm)
     for frame in np.unique(frames):
         rows = np.flatnonzero(frames == frame)
-        near = cKDTree(points_mm[rows]).query(points_mm[rows], k=min(neighbours, len(rows)))[1]
+        near = cKDTree(points_mm[rows]).query(points_mm[rows], k=min(_NEIGHBOURS, len(rows)))[1]
         around = points_mm[rows][near.reshape(len(rows), -1)]
         around = around - np.median(around, axis=1, keepdims=True)
         # Wrong points are far away: weights that fall with the distance make the plane robust.
@@ -109,12 +104,12 @@ def _projected_patches(source, target, grey, pixels, points_mm, normals, radius_
     return there.reshape(at.shape), _sampled(grey, at)
 
 
-def _shifts(grey, where, patch, rounds, max_shift_px):
+def _shifts(grey, where, patch):
     """Shifts (N, 2) px that make an image agree with patches up to gain and offset; correlation."""
     y_slope, x_slope = np.gradient(grey.astype(np.float32))
     wanted = _standardised(patch)[0]
     shift = np.zeros((len(where), 2))
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         at = where + shift[:, None]
         values, scale = _standardised(_sampled(grey, at))
         slopes = np.stack([_sampled(s, at) for s in (x_slope, y_slope)], axis=2)
@@ -128,7 +123,7 @@ def _shifts(grey, where, patch, rounds, max_shift_px):
         step = np.linalg.solve(
             np.nan_to_num(left) + 1e-9 * np.eye(2), np.nan_to_num(right)[..., None]
         )
-        shift = np.clip(shift + step[..., 0], -max_shift_px, max_shift_px)
+        shift = np.clip(shift + step[..., 0], -_MAX_SHIFT_PX, _MAX_SHIFT_PX)
     values, _ = _standardised(_sampled(grey, where + shift[:, None]))
     return shift, np.nan_to_num((values * wanted).sum(axis=1))
 

@@ -38,7 +38,7 @@ from vermilion.capture.tracks import (
 )
 from vermilion.geometry.camera import Camera
 
-MultiviewImages = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its features
+FrameFeatures = Mapping[int, Mapping[str, Features]]  # frame -> camera -> its features
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class RigRefinement:
 
 def refine_cameras(
     given: Mapping[str, Camera],
-    images: MultiviewImages,
+    images: FrameFeatures,
     matching: FeatureMatchSettings,
     settings: RigRefinementSettings,
     only_if_off: bool = True,
@@ -137,7 +137,7 @@ def refine_cameras(
 def _adjusted(
     given: dict[str, Camera],
     fitted: Tracks,
-    images: MultiviewImages,
+    images: FrameFeatures,
     greys: Greys | None,
     matching: FeatureMatchSettings,
     settings: RigRefinementSettings,
@@ -177,7 +177,7 @@ def _compared(
 
 
 def _match(
-    cameras: dict[str, Camera], images: MultiviewImages, matching: FeatureMatchSettings
+    cameras: dict[str, Camera], images: FrameFeatures, matching: FeatureMatchSettings
 ) -> Tracks:
     frames = sorted(images)
     return concatenate_tracks([match_frame(cameras, images[f], matching, f) for f in frames])
@@ -188,7 +188,7 @@ def _split(tracks: Tracks, part: float, seed: int) -> tuple[Tracks, Tracks]:
     return tracks.kept(held[tracks.track]), tracks.kept(~held[tracks.track])
 
 
-def _without(images: MultiviewImages, tracks: Tracks) -> MultiviewImages:
+def _without(images: FrameFeatures, tracks: Tracks) -> FrameFeatures:
     """The features that are in none of these tracks."""
     rest: dict[int, dict[str, Features]] = {}
     for frame, views in images.items():
@@ -204,7 +204,7 @@ def _without(images: MultiviewImages, tracks: Tracks) -> MultiviewImages:
     return rest
 
 
-def _greys(images: MultiviewImages) -> Greys | None:
+def _greys(images: FrameFeatures) -> Greys | None:
     """The images of all features; None where one is missing."""
     greys: dict[int, dict[str, np.ndarray]] = {}
     for frame, views in images.items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from vermilion.imaging.video import VideoIndex, VideoReader
 from vermilion.storage.errors import InputError
-from vermilion.storage.files import atomic_path, sha256_of
+from vermilion.storage.files import sha256_of, write_text
 
 FORMAT_VERSION = 1
 #: Part of the median interval by which intervals of an even video may differ (rounded time stamps).
@@ -62,9 +62,8 @@ class VideoFacts:
 
     def save(self, path: str | Path) -> None:
         """Write as JSON, whole or not at all."""
-        with atomic_path(path) as temporary:
-            content = {"format_version": FORMAT_VERSION, **asdict(self)}
-            temporary.write_text(json.dumps(content, sort_keys=True) + "\n")
+        content = {"format_version": FORMAT_VERSION, **asdict(self)}
+        write_text(path, json.dumps(content, sort_keys=True) + "\n")
 
 
 def video_facts(path: str | Path) -> VideoFacts:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import av
 import cv2
@@ -70,13 +72,9 @@ class VideoColour:
     def is_hdr(self) -> bool:
         return self.transfer in ("pq", "hlg")
 
-    def rgb8(self, frame: av.VideoFrame) -> np.ndarray:
-        """Code values (h, w, 3) uint8 R'G'B' of a decoded frame, by matrix and range."""
-        return frame.to_ndarray(format="rgb24", **self._matrices())
-
     def light(self, frame: av.VideoFrame) -> np.ndarray:
         """Linear light (h, w, 3) float32, BT.709 primaries: nits for HDR, else relative to white."""
-        codes = frame.to_ndarray(format="rgb48le", **self._matrices())
+        codes = frame.to_ndarray(**self._format("rgb48le"))
         if self.is_hdr:
             light = light_of(codes, self.transfer)
         else:
@@ -90,14 +88,15 @@ class VideoColour:
     def srgb8(self, frame: av.VideoFrame, white_nits: float = 1.0, peak_nits: float = 1.0):
         """The frame as (h, w, 3) uint8 sRGB; white and peak of the clip for HDR."""
         if self.is_plain:
-            return self.rgb8(frame)
+            return frame.to_ndarray(**self._format("rgb24"))
         display = tone_map(self.light(frame), white_nits, peak_nits)
         return np.rint(display * 255.0).astype(np.uint8)
 
-    def _matrices(self) -> dict[str, int]:
+    def _format(self, name: str) -> dict[str, Any]:
+        """How PyAV is to convert a frame to a pixel format, by the matrix."""
         if self.matrix is None:
-            return {}
-        return {"src_colorspace": self.matrix, "dst_colorspace": self.matrix}
+            return {"format": name}
+        return {"format": name, "src_colorspace": self.matrix, "dst_colorspace": self.matrix}
 
 
 def colour_of_frame(frame: av.VideoFrame, **place) -> VideoColour:
@@ -106,7 +105,8 @@ def colour_of_frame(frame: av.VideoFrame, **place) -> VideoColour:
     Raises RefusedInputError with `place` where a tag says what is not converted here.
     """
     transfer = _transfer(frame, place)
-    dolby = any(data.type.name.startswith("DOVI") for data in frame.side_data)
+    entries: Iterable[Any] = frame.side_data  # the stub lists the keys
+    dolby = any(entry.type.name.startswith("DOVI") for entry in entries)
     if dolby and transfer == "display" and int(frame.colorspace) == _UNSPECIFIED:
         raise _refused("Dolby Vision without a base layer that others show (profile 5)", place)
     primaries = int(frame.color_primaries)

@@ -6,11 +6,6 @@ import numpy as np
 import OpenImageIO as oiio
 
 
-def display_size(spec: oiio.ImageSpec) -> tuple[int, int]:
-    """(width, height) of the display window."""
-    return spec.full_width, spec.full_height
-
-
 def to_display_window(pixels: np.ndarray, spec: oiio.ImageSpec) -> np.ndarray:
     """The display window of an image: overscan is cut, black stands where nothing is stored.
 

@@ -11,20 +11,32 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import Hits, RayCaster, interpolate
+from vermilion.imaging.frames import FrameSource
 from vermilion.imaging.images import linear_to_srgb
+from vermilion.storage.errors import InputError
 
 _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
 
 
 def to_display(linear: np.ndarray) -> np.ndarray:
-    """Linear RGB (h, w, 3) as sRGB uint8."""
+    """`linear` RGB (h, w, 3) as sRGB uint8."""
     return np.rint(linear_to_srgb(linear) * 255).astype(np.uint8)
+
+
+def shown_frame(
+    source: FrameSource, camera: str, frame: int, size_px: tuple[int, int] = (320, 240)
+) -> np.ndarray:
+    """A frame as sRGB (h, w, 3) uint8; black of some (width, height) where it cannot be read."""
+    try:
+        return to_display(source.read(camera, frame))
+    except InputError:
+        return np.zeros((size_px[1], size_px[0], 3), dtype=np.uint8)
 
 
 def draw_points(
     image: np.ndarray, points_px: np.ndarray, colour: Sequence[int], radius_px: int = 2
 ) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with discs at (N, 2) pixels; NaN is left out."""
+    """A copy of `image` (h, w, 3) uint8 with discs at `points_px` (N, 2); NaN is left out."""
     image = np.ascontiguousarray(image).copy()
     for x, y in _fixed(points_px):
         cv2.circle(image, (x, y), radius_px << _SHIFT, tuple(colour), -1, cv2.LINE_AA, _SHIFT)
@@ -32,17 +44,13 @@ def draw_points(
 
 
 def draw_polyline(
-    image: np.ndarray,
-    points_px: np.ndarray,
-    colour: Sequence[int],
-    closed: bool = True,
-    width_px: int = 1,
+    image: np.ndarray, points_px: np.ndarray, colour: Sequence[int], closed: bool = True
 ) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with a polyline through (N, 2) pixels; NaN is left out."""
+    """A copy of `image` (h, w, 3) uint8 with a line through `points_px` (N, 2); NaN is left out."""
     image = np.ascontiguousarray(image).copy()
     points = _fixed(points_px).reshape(-1, 1, 2)
     if len(points):
-        cv2.polylines(image, [points], closed, tuple(colour), width_px, cv2.LINE_AA, _SHIFT)
+        cv2.polylines(image, [points], closed, tuple(colour), 1, cv2.LINE_AA, _SHIFT)
     return image
 
 
@@ -54,9 +62,17 @@ def draw_mesh(
     colours: np.ndarray | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """A shaded mesh over (h, w, 3) uint8, seen from `camera` with a headlight.
+    """A shaded mesh over an image, seen from `camera` with a headlight.
 
-    `colours` (V, 3) in [0, 1]; light grey by default.
+    Args:
+        image: (h, w, 3) uint8.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        colours: (V, 3) in [0, 1]; light grey by default.
+        opacity: of the mesh, 0 to 1.
+
+    Returns:
+        (h, w, 3) uint8.
     """
     hits = RayCaster(vertices_mm, triangles).see(camera)
     return paint_mesh(image, camera, hits, vertices_mm, triangles, colours, opacity)
@@ -71,7 +87,18 @@ def paint_mesh(
     colours: np.ndarray | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """`draw_mesh` with what the camera sees of the mesh already known."""
+    """`draw_mesh` with what the camera sees of the mesh already known.
+
+    Args:
+        image: (h, w, 3) uint8.
+        hits: what each pixel of the camera sees.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        colours: (V, 3) in [0, 1]; light grey by default.
+
+    Returns:
+        (h, w, 3) uint8.
+    """
     normals = interpolate(hits, triangles, vertex_normals(vertices_mm, triangles))
     _, directions = camera.rays(camera.pixel_grid())
     facing = np.abs((normals * directions).sum(axis=-1))
@@ -83,15 +110,17 @@ def paint_mesh(
     return np.rint(image * (1 - mask) + shaded * mask).astype(np.uint8)
 
 
-def colour_map(values: np.ndarray, low: float, high: float, name: str = "turbo") -> np.ndarray:
-    """Values (...,) as RGB (..., 3) in [0, 1]; NaN is grey."""
+def colour_map(
+    values: np.ndarray | float, low: float, high: float, name: str = "turbo"
+) -> np.ndarray:
+    """`values` (...,) as RGB (..., 3) in [0, 1]; NaN is grey."""
     scaled = (np.asarray(values, dtype=float) - low) / (high - low)
     rgb = matplotlib.colormaps[name](np.clip(np.nan_to_num(scaled), 0, 1))[..., :3]
     return np.where(np.isnan(scaled)[..., None], 0.5, rgb)
 
 
 def label(image: np.ndarray, text: str) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with a line of text in its top left corner."""
+    """A copy of `image` (h, w, 3) uint8 with a line of text in its top left corner."""
     image = np.ascontiguousarray(image).copy()
     size = max(0.4, image.shape[1] / 1200)
     place = (6, round(24 * size) + 4)
@@ -100,8 +129,14 @@ def label(image: np.ndarray, text: str) -> np.ndarray:
     return image
 
 
+def resized_to_height(image: np.ndarray, height_px: int) -> np.ndarray:
+    """`image` (h, w, 3) uint8 at another height, its pixels averaged."""
+    width = max(1, round(image.shape[1] * height_px / image.shape[0]))
+    return cv2.resize(image, (width, height_px), interpolation=cv2.INTER_AREA)
+
+
 def tile(images: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Images (h, w, 3) uint8 of any sizes side by side, all scaled to the first one's height."""
+    """`images` (h, w, 3) uint8 of any sizes side by side, scaled to the first one's height."""
     height = images[0].shape[0]
     scaled = [
         p

@@ -49,6 +49,7 @@ class FolderFrames:
             self._paths.update(list_frames(folder))
 
     def read(self, camera: str, frame: int) -> np.ndarray:
+        """Linear RGB (h, w, 3) float32; see `FrameSource`."""
         place = {"subject": self.subject, "take": self.take, "camera": camera, "frame": frame}
         if frame not in self._paths:
             raise InputError(
@@ -99,6 +100,7 @@ class CaptureFrames:
         return self._cameras[camera]
 
     def read(self, camera: str, frame: int) -> np.ndarray:
+        """Linear RGB (h, w, 3) float32; see `FrameSource`."""
         return self._camera(camera).read(camera, frame)
 
     def size(self, camera: str) -> tuple[int, int]:
@@ -117,6 +119,7 @@ class VideoFrames:
         self._reader = VideoReader(path)
 
     def read(self, camera: str, frame: int) -> np.ndarray:
+        """Linear RGB (h, w, 3) float32; see `FrameSource`."""
         pixels = self._reader.read(frame, subject=self.subject, take=self.take, camera=camera)
         return _LINEAR[pixels]
 
@@ -148,6 +151,14 @@ def open_frames(
         take=take,
         path=path,
     )
+
+
+def read_or_none(source: FrameSource, camera: str, frame: int) -> np.ndarray | None:
+    """Linear RGB (h, w, 3) of a frame, None where it cannot be read."""
+    try:
+        return source.read(camera, frame)
+    except InputError:
+        return None
 
 
 def reading_of(source: Source) -> ImageReading:

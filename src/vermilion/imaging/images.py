@@ -9,7 +9,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 from vermilion.imaging.colour_space import to_linear
-from vermilion.imaging.display_window import display_size, to_display_window
+from vermilion.imaging.display_window import to_display_window
 from vermilion.imaging.exr_layers import choose_layer, layers_of
 from vermilion.imaging.orientation import Orientation, orientation_of_exif
 from vermilion.imaging.pixel_aspect import resample, square_size
@@ -43,13 +43,15 @@ class ImageReading:
 
 
 AS_TAGGED = ImageReading()
+#: Luminance of linear RGB (ITU-R BT.709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 #: Colours beside an alpha channel are not darkened by it.
 _UNASSOCIATED = oiio.ImageSpec()
 _UNASSOCIATED["oiio:UnassociatedAlpha"] = 1
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1, [0, 1] -> [0, 1], float32."""
+    """Linear `values` (...,) float32 of sRGB ones (...,), both in [0, 1] (IEC 61966-2-1)."""
     values = np.asarray(values, dtype=np.float32)
     return np.where(
         values <= 0.04045, values / 12.92, ((np.maximum(values, 0) + 0.055) / 1.055) ** 2.4
@@ -63,7 +65,7 @@ _LINEAR_OF_BYTE = srgb_to_linear(np.arange(256, dtype=np.float32) * _BYTE)
 
 
 def linear_to_srgb(values: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1, clipped to [0, 1], float32."""
+    """sRGB `values` (...,) float32 of linear ones (...,), clipped to [0, 1] (IEC 61966-2-1)."""
     values = np.clip(np.asarray(values, dtype=np.float32), 0.0, 1.0)
     return np.where(
         values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055
@@ -144,7 +146,7 @@ def write_image(path: str | Path, linear: np.ndarray) -> None:
 
 
 def write_srgb8(path: str | Path, pixels: np.ndarray) -> None:
-    """Write (h, w, 3) or (h, w) uint8 as it is (PNG or JPEG)."""
+    """Write `pixels` (h, w, 3) or (h, w) uint8 as they are (PNG or JPEG)."""
     pixels = np.ascontiguousarray(np.atleast_3d(pixels))
     height, width, depth = pixels.shape
     spec = oiio.ImageSpec(width, height, depth, oiio.UINT8)
@@ -154,7 +156,7 @@ def write_srgb8(path: str | Path, pixels: np.ndarray) -> None:
 
 
 def write_channels(path: str | Path, channels: dict[str, np.ndarray]) -> None:
-    """Write named (h, w) channels as half-float EXR, zip compressed."""
+    """Write named `channels` (h, w) as half-float EXR, zip compressed."""
     pixels = np.ascontiguousarray(np.stack(list(channels.values()), axis=-1), dtype=np.float32)
     height, width, depth = pixels.shape
     spec = oiio.ImageSpec(width, height, depth, oiio.HALF)
@@ -252,7 +254,7 @@ def _square(path: Path, spec: oiio.ImageSpec, place: dict) -> tuple[int, int]:
     """(width, height) with square pixels, not yet turned upright."""
     width, height = spec.width, spec.height
     if path.suffix.lower() == _EXR:
-        width, height = display_size(spec)
+        width, height = spec.full_width, spec.full_height
     if path.suffix.lower() not in _WITH_ASPECT:
         return width, height
     try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import av
 import av.filter
 
@@ -30,5 +32,5 @@ def deinterlace(
         if neighbour is not None:
             source.push(neighbour)
     source.push(None)
-    image = sink.pull()
-    return sink.pull() if before is not None else image
+    images = [sink.pull() for _ in range(1 if before is None else 2)]
+    return cast(av.VideoFrame, images[-1])

@@ -57,11 +57,11 @@ def orientation_of_exif(tag: int) -> Orientation:
     return _EXIF.get(int(tag), UPRIGHT)
 
 
-def orientation_of_matrix(matrix: Sequence[int]) -> Orientation:
+def orientation_of_matrix(matrix: Sequence[int] | np.ndarray) -> Orientation:
     """Orientation of a display matrix of MP4 and QuickTime.
 
     Args:
-        matrix: nine numbers a b u, c d v, x y w; a stored pixel (p, q), q down, is shown at
+        matrix: (9,) numbers a b u, c d v, x y w; a stored pixel (p, q), q down, is shown at
             (a p + c q + x, b p + d q + y).
 
     Raises:

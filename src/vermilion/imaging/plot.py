@@ -29,7 +29,10 @@ def plain(axis) -> None:
 
 
 def with_gaps(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Insert a NaN where frame numbers jump, so that no line is drawn across."""
+    """`frames` (F,) and `values` (F,), each (F + jumps,) with a NaN where frame numbers jump.
+
+    So no line is drawn across.
+    """
     jumps = np.flatnonzero(np.diff(frames) > 1) + 1
     return np.insert(frames.astype(float), jumps, np.nan), np.insert(values, jumps, np.nan)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -74,6 +75,7 @@ def presentation_of(
 
 
 def _orientation(frame: av.VideoFrame) -> Orientation:
+    data: Any  # the stub lists the keys
     for data in frame.side_data:
         if data.type.name == "DISPLAYMATRIX":
             return orientation_of_matrix(np.frombuffer(bytes(data), dtype="<i4")[:9])

@@ -37,5 +37,7 @@ def sample_bilinear(image: np.ndarray, pixels: np.ndarray, border: Border = "rep
     image, places = np.ascontiguousarray(image), np.ascontiguousarray(places)
     if not count:
         return np.zeros(shape, dtype=image.dtype)
-    found = cv2.remap(image, places, None, cv2.INTER_LINEAR, borderMode=_BORDERS[border])
+    found = cv2.remap(  # type: ignore[call-overload] # the stub wants a second map
+        image, places, None, cv2.INTER_LINEAR, borderMode=_BORDERS[border]
+    )
     return found.reshape(-1, *image.shape[2:])[:count].reshape(shape)

@@ -44,15 +44,14 @@ def shade(
     _shade(
         hits.triangle.ravel(), hits.barycentric.reshape(-1, 3), local,
         np.ascontiguousarray(triangles), np.ascontiguousarray(normals),
-        np.ascontiguousarray(colours, dtype=np.float64), _LIGHT, _DISPLAY, float(opacity),
-        result.reshape(-1, 3),
+        np.ascontiguousarray(colours, dtype=np.float64), float(opacity), result.reshape(-1, 3),
     )  # fmt: skip
     return result
 
 
 @numba.njit(cache=True)
 def _shade(  # pragma: no cover - compiled
-    triangle, barycentric, directions, triangles, normals, colours, light, display, opacity, out
+    triangle, barycentric, directions, triangles, normals, colours, opacity, out
 ):
     """Lambert and Blinn in the camera's frame; the back of a surface is dark."""
     n = np.empty(3)
@@ -75,8 +74,8 @@ def _shade(  # pragma: no cover - compiled
         sign = 1.0 if facing >= 0 else -1.0
         diffuse = across = square = 0.0
         for k in range(3):
-            half = light[k] - directions[pixel, k]
-            diffuse += n[k] * light[k]
+            half = _LIGHT[k] - directions[pixel, k]
+            diffuse += n[k] * _LIGHT[k]
             across += n[k] * half
             square += half * half
         diffuse = min(max(sign * diffuse / length, 0.0), 1.0)
@@ -85,6 +84,6 @@ def _shade(  # pragma: no cover - compiled
             value = albedo[k] * (0.22 + 0.78 * diffuse) + 0.18 * across**25
             if sign < 0:
                 value *= 0.35
-            shown = display[int(1023 * min(max(value, 0.0), 1.0))]
+            shown = _DISPLAY[int(1023 * min(max(value, 0.0), 1.0))]
             mixed = out[pixel, k] * (1 - opacity) + shown * opacity
             out[pixel, k] = np.uint8(min(max(mixed + 0.5, 0.0), 255.0))

@@ -18,7 +18,7 @@ _LUMINANCE = np.array([0.2627, 0.6780, 0.0593], dtype=np.float32)
 
 
 def pq_to_nits(signal: np.ndarray) -> np.ndarray:
-    """Light (nits) of a PQ signal in [0, 1] (SMPTE ST 2084)."""
+    """Light (...,) in nits of a PQ `signal` (...,) in [0, 1] (SMPTE ST 2084)."""
     m1, m2 = 2610 / 16384, 128 * 2523 / 4096
     c1, c2, c3 = 3424 / 4096, 32 * 2413 / 4096, 32 * 2392 / 4096
     root = np.asarray(signal, dtype=np.float64) ** (1 / m2)
@@ -26,7 +26,7 @@ def pq_to_nits(signal: np.ndarray) -> np.ndarray:
 
 
 def hlg_to_scene(signal: np.ndarray) -> np.ndarray:
-    """Relative scene light in [0, 1] of an HLG signal in [0, 1] (ARIB STD-B67)."""
+    """Relative scene light (...,) in [0, 1] of an HLG `signal` (...,) in [0, 1] (ARIB STD-B67)."""
     a, b, c = 0.17883277, 0.28466892, 0.55991073
     signal = np.asarray(signal, dtype=np.float64)
     return np.where(signal <= 0.5, signal**2 / 3, (np.exp((signal - c) / a) + b) / 12)
@@ -57,7 +57,7 @@ def _curve(transfer: str) -> np.ndarray:
 
 
 def reference_white(light: np.ndarray) -> tuple[float, float]:
-    """White and peak (nits) of a clip, from some of its images (..., 3), BT.709 primaries.
+    """White and peak (nits) of a clip, from the `light` (..., 3) of some images, BT.709 primaries.
 
     White is 203 nits as HDR is graded, and 100 nits where next to nothing (one value of a thousand)
     is nearer to the former: then SDR was put into an HDR signal as it is.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
@@ -17,11 +17,8 @@ from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTr
 
 from vermilion.imaging.interlace import deinterlace
 from vermilion.imaging.presentation import Presentation, presentation_of
-from vermilion.imaging.source import VIDEO_SUFFIXES
 from vermilion.storage.errors import InputError, RefusedInputError
 from vermilion.storage.files import atomic_path
-
-__all__ = ["VIDEO_SUFFIXES", "VideoIndex", "VideoReader", "write_video"]
 
 #: Decoded frames that are kept: an interlaced one needs its neighbours.
 _KEPT = 3
@@ -77,7 +74,7 @@ class VideoReader:
                 path=path,
             )
         self._stream.thread_type = "AUTO"
-        self._decoder = None
+        self._decoder: Iterator[av.VideoFrame] = iter(())
         self._next = -1
         self._kept: dict[int, av.VideoFrame] = {}
         self._presentation: Presentation | None = None
@@ -111,6 +108,7 @@ class VideoReader:
     @property
     def seconds_per_tick(self) -> float:
         """Unit of the time stamps of the index."""
+        assert self._stream.time_base is not None  # FFmpeg gives every stream one
         return float(self._stream.time_base)
 
     def read(self, frame: int, **place) -> np.ndarray:
@@ -177,9 +175,9 @@ class VideoReader:
         before = bisect_left(keys, stamp)
         # Where a key frame is shown after frames that follow it in the file, the seek comes too
         # late: then an earlier one serves.
-        starts = [stamp, keys[max(before - 2, 0)] if keys else stamp]
+        starts: list[int | None] = [stamp, keys[max(before - 2, 0)] if keys else stamp]
         # A few frames ahead are decoded rather than sought.
-        if self._decoder is not None and self._next <= frame <= self._next + 32:
+        if self._next <= frame <= self._next + 32:
             starts.insert(0, None)
         try:
             for start in starts:
@@ -191,9 +189,9 @@ class VideoReader:
                     return decoded
             misplaced = any(later.pts == stamp for later in islice(self._decoder, 16))
         except av.FFmpegError as error:
-            self._decoder = None
+            self._decoder = iter(())
             raise self._damaged(frame, str(error), place) from error
-        self._decoder = None
+        self._decoder = iter(())
         if misplaced:
             raise self._out_of_order(frame, place)
         raise self._damaged(frame, "the stream has no such frame or ends early", place)
@@ -253,7 +251,7 @@ def _list_packets(container: av.container.InputContainer, stream: av.VideoStream
 
 
 def write_video(path: str | Path, images: Iterable[np.ndarray], fps: float) -> None:
-    """Write (h, w, 3) uint8 sRGB images as H.264 in MP4, tagged as BT.709.
+    """Write `images` (h, w, 3) uint8 sRGB as H.264 in MP4, tagged as BT.709.
 
     Odd sizes lose one row or column.
     """

@@ -5,10 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from vermilion.imaging.images import LUMINANCE
 from vermilion.imaging.sampling import sample_bilinear
-
-#: Luminance of linear RGB (ITU-R BT.709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 def sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:

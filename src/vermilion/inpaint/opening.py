@@ -91,10 +91,6 @@ class Opening:
         inside = there & (row > upper) & (row < lower)
         return inside, there & (row > upper - reach) & (row < lower + reach)
 
-    def inside(self, pixels: np.ndarray) -> np.ndarray:
-        """Whether places `pixels` (..., 2) lie in the opening, (...,) bool."""
-        return self.inside_and_near(pixels)[0]
-
 
 @dataclass(frozen=True)
 class MouthPlace:

@@ -11,15 +11,12 @@ from vermilion.imaging.draw import label, tile, to_display
 from vermilion.inpaint.bake import Texture
 
 
-def before_after(
-    frame: int, before: np.ndarray, after: np.ndarray, height_px: int = 240
-) -> np.ndarray:
+def before_after(frame: int, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The window of one frame before and after, one above the other, (h, w, 3) uint8.
 
     `before` and `after` (h, w, 3) uint8, of the same size.
     """
-    scale = height_px / before.shape[0]
-    size = (max(1, round(before.shape[1] * scale)), height_px)
+    size = (max(1, round(before.shape[1] * (240 / before.shape[0]))), 240)
     pair = [cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) for image in (before, after)]
     return np.vstack([label(pair[0], f"{frame}"), pair[1]])
 

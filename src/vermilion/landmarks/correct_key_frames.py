@@ -26,7 +26,7 @@ from vermilion.landmarks.flow import FaceFlow
 from vermilion.landmarks.key_frames import BETWEEN, KeyFrames
 from vermilion.landmarks.lip_side import off_lips, onto_lips
 from vermilion.landmarks.scheme import N_LANDMARKS
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 
 
 def settle(
@@ -57,16 +57,17 @@ def settle(
     clip_of = np.searchsorted(ends, wanted)
     for clip in np.unique(clip_of):
         at = clip_of == clip
-        rows, ways, start, end = wanted[at], [], None, None
+        rows, spans = wanted[at], []
         if clip > 0:
-            start = ends[clip - 1]
-            way = range(start, rows[-1] + 1)
-            ways.append(_carried(read_grey, track, way, trusted[start], rows, shapes, settings))
+            spans.append(range(ends[clip - 1], rows[-1] + 1))
         if clip < len(ends):
-            end = ends[clip]
-            way = range(end, rows[0] - 1, -1)
-            ways.append(_carried(read_grey, track, way, trusted[end], rows, shapes, settings))
-        later = (rows - start) / (end - start) if len(ways) == 2 else None
+            spans.append(range(ends[clip], rows[0] - 1, -1))
+        ways = [
+            _carried(read_grey, track, span, trusted[span.start], rows, shapes, settings)
+            for span in spans
+        ]
+        start, end = spans[0].start, spans[-1].start
+        later = (rows - start) / (end - start) if len(spans) == 2 else None
         points[at], confidence[at] = join(ways, later)
     flow = FlowPoints(points, confidence)
     settled = keys.points_px.copy()
@@ -85,15 +86,11 @@ def _carried(
     settings: CorrectionSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 66, 2) of the first row of a way in n wanted rows of it, and trust (n, 66)."""
-    engine, points, astray = FaceFlow(settings.face_px), onto_lips(points_px), 0.0
+    engine, points, astray = FaceFlow(settings.face_px), onto_lips(points_px), np.zeros(N_LANDMARKS)
     found = np.zeros((len(wanted), N_LANDMARKS, 2))
     sure = np.zeros(found.shape[:2])
     last = last_row = None
-    for row in way:
-        try:
-            grey = read_grey(int(track.frames[row]))
-        except InputError:
-            continue
+    for row, grey in readable(way, lambda row: read_grey(int(track.frames[row]))):
         if last is not None:
             flow = engine.between(last, grey, shapes[last_row], shapes[row])
             points, off = flow.carry(points)

@@ -21,7 +21,7 @@ from vermilion.landmarks.scheme import (
     N_LANDMARKS,
     face_size_px,
 )
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -111,7 +111,12 @@ def flow_points(
     rows: np.ndarray,
     settings: CorrectionSettings,
 ) -> FlowPoints:
-    """Flow from the key frames before and after, for some rows of a take's track."""
+    """Flow from the key frames before and after, for some rows of a take's track.
+
+    Args:
+        read_grey: display brightness (h, w) in [0, 1] of a frame; may raise InputError.
+        rows: (F,) of the track.
+    """
     points = np.full((len(track.frames), N_LANDMARKS, 2), np.nan)
     confidence = np.zeros(points.shape[:2])
     key_rows = np.searchsorted(track.frames, keys.frames)
@@ -135,11 +140,7 @@ def _clip_points(read_grey, frames, span, shapes, ends, settings):
     """Points (n, 66, 2) and confidence (n, 66) of the rows `span` between two key frames."""
     read, flows, last = [], [], None
     engine = FaceFlow(settings.face_px)
-    for row in progress(span, "flow"):
-        try:
-            grey = read_grey(int(frames[row]))
-        except InputError:
-            continue
+    for row, grey in readable(progress(span, "flow"), lambda row: read_grey(int(frames[row]))):
         if last is not None:
             flows.append(engine.between(last, grey, shapes[read[-1]], shapes[row]))
         last = grey
@@ -160,9 +161,10 @@ def _clip_points(read_grey, frames, span, shapes, ends, settings):
 
 
 def trust(astray_px: np.ndarray, shapes: np.ndarray, settings: CorrectionSettings) -> np.ndarray:
-    """How sure flow is, (..., 66) in [0, 1], that has not led back by (..., 66) px.
+    """How sure flow is, (..., 66) in [0, 1], that does not lead back to where it started.
 
     Args:
+        astray_px: (..., 66) by how much it does not.
         shapes: (..., 66, 2) px, about where the face is.
     """
     tolerance = settings.tolerance * face_size_px(shapes)[..., None]
@@ -175,10 +177,10 @@ def join(
     """Points (n, 66, 2) and confidence (n, 66) of flow from the key frame before and the one after.
 
     Args:
-        ways: points and trust of each of the one or two flows.
+        ways: points (n, 66, 2) and trust (n, 66) of each of the one or two flows.
         later: (n,) in [0, 1], how far a frame is from the first key frame to the second.
     """
-    if len(ways) == 1:
+    if len(ways) == 1 or later is None:
         return ways[0]
     share = (0.5 - 0.5 * np.cos(np.pi * later))[:, None]
     weights = np.stack([(1 - share) * ways[0][1], share * ways[1][1]])
@@ -197,7 +199,11 @@ def blend(
     """Detected and flow points together (Mono13 eq. 4), for some rows of a track.
 
     The weight 1 - lambda of the flow is multiplied by its confidence. Where no face was found the
-    flow stands alone, if it is sure enough; at given key frames (F,) the given points do.
+    flow stands alone, if it is sure enough; at given key frames the given points do.
+
+    Args:
+        rows: (F,) of the track.
+        at_given: (F,) bool, given key frames.
     """
     detected, valid = track.points_px[rows], track.valid[rows]
     weight = settings.per_landmark()
@@ -234,7 +240,7 @@ def rough_shapes(track: LandmarkTrack, keys: KeyFrames) -> np.ndarray:
 def quality_rows(
     detected: LandmarkTrack, rows: np.ndarray, track: LandmarkTrack, flow: FlowPoints
 ) -> list[QualityRow]:
-    """A row a frame: how far the correction moved the points, how sure flow and detector are."""
+    """For each of `rows` (F,): how far the correction moved points, how sure flow and detector are."""
     result = []
     for k, row in enumerate(rows):
         found, good = bool(detected.valid[row]), bool(track.valid[k])

@@ -5,12 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import KeyFrames
 from vermilion.landmarks.scheme import LIP_INNER, LIP_OUTER
-from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
@@ -23,8 +22,6 @@ def correction_overlay(
     detected: LandmarkTrack,
     corrected: LandmarkTrack,
     keys: KeyFrames,
-    count: int = 9,
-    columns: int = 3,
 ) -> np.ndarray:
     """Frames of `corrected`, evenly spread, cut to the face; (h, w, 3) uint8.
 
@@ -34,15 +31,11 @@ def correction_overlay(
     Args:
         detected: of the same frames or more.
     """
-    rows = evenly_spaced(len(corrected.frames), count)
     kinds = dict(zip(keys.frames.tolist(), keys.kinds.tolist(), strict=True))
     images = []
-    for row in rows:
+    for row in evenly_spaced(len(corrected.frames), 9):
         frame = int(corrected.frames[row])
-        try:
-            image = to_display(source.read(camera, frame))
-        except InputError:
-            image = np.zeros((240, 320, 3), dtype=np.uint8)
+        image = shown_frame(source, camera, frame)
         points = corrected.points_px[row]
         before = detected.points_px[np.searchsorted(detected.frames, frame)]
         text = f"{frame}" + (f": key frame ({kinds[frame]})" if frame in kinds else "")
@@ -59,7 +52,7 @@ def correction_overlay(
                 image = draw_polyline(image, np.stack([a, b]), _DETECTED, closed=False)
             image = draw_points(image, before, _DETECTED, 2)
         images.append(label(draw_points(image, points, _CORRECTED, 2), text))
-    return tile(images, columns)
+    return tile(images, 3)
 
 
 def _square_round(points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:

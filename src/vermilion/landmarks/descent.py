@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -17,7 +16,7 @@ from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
 from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
-from vermilion.landmarks.sets import IBUG66, LandmarkSet
+from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import ModelFileError
 
@@ -42,7 +41,7 @@ class ImageSimilarity:
 
     @classmethod
     def between(cls, source: np.ndarray, target: np.ndarray) -> ImageSimilarity:
-        """Least squares, of points (N, 2) to points (N, 2)."""
+        """Least squares, of `source` (N, 2) to `target` (N, 2)."""
         a, b = source - source.mean(axis=0), target - target.mean(axis=0)
         za, zb = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
         z = (np.conj(za) @ zb) / max(np.real(np.conj(za) @ za), 1e-12)
@@ -54,7 +53,7 @@ class ImageSimilarity:
 
 
 def upright_channels(grey: np.ndarray, to_image: ImageSimilarity, size_px: int) -> np.ndarray:
-    """Blurred orientation channels of the image resampled into the mean shape's frame.
+    """Blurred orientation channels (s, s, 8) of `grey` (h, w), resampled into the mean shape's frame.
 
     The mean shape has size 1 about the origin; `size_px` pixels are 1, the origin in the middle.
     """
@@ -79,7 +78,8 @@ def upright_channels(grey: np.ndarray, to_image: ImageSimilarity, size_px: int) 
 
 
 def shape_features(grey: np.ndarray, shape: np.ndarray, mean: np.ndarray, size_px: int):
-    """Features (66, 128) round a shape (66, 2) px, and the similarity from the mean's frame."""
+    """Features (66, 128) of `grey` (h, w) round `shape` (66, 2) px, and the similarity that brings
+    `mean` (66, 2) to it."""
     to_image = ImageSimilarity.between(mean, shape)
     channels = upright_channels(grey, to_image, size_px)
     local = (shape - to_image.shift) @ np.linalg.inv(to_image.matrix).T
@@ -99,7 +99,7 @@ class DescentDetector:
         found_threshold: least mean confidence.
     """
 
-    landmark_set: ClassVar[LandmarkSet] = IBUG66
+    landmark_set = IBUG66
 
     mean: np.ndarray
     steps: np.ndarray
@@ -108,7 +108,7 @@ class DescentDetector:
     found_threshold: float
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of the surest face; see `Landmarks`."""
+        """Landmarks of the surest face in `linear_rgb` (h, w, 3)."""
         grey = grey_of(linear_rgb)
         best = Landmarks.none()
         for centre, size, _ in self.locator.locate(grey):
@@ -120,7 +120,7 @@ class DescentDetector:
         return best if best.confidence.mean() >= self.found_threshold else Landmarks.none()
 
     def refine(self, grey: np.ndarray, shape: np.ndarray) -> Landmarks:
-        """All stages from a starting shape (66, 2) px, and how sure each point is."""
+        """All stages on `grey` (h, w) from a starting `shape` (66, 2) px, and how sure each point is."""
         sizes = stage_sizes(len(self.steps))
         for size_px, step in zip(sizes, self.steps, strict=True):
             features, to_image = shape_features(grey, shape, self.mean, size_px)

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
-from vermilion.landmarks.detector import LandmarkDetector, Landmarks, LandmarkTrack
+from vermilion.landmarks.detector import Landmarks, LandmarkTrack
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
@@ -43,25 +43,12 @@ def detect_frames(
     return LandmarkTrack.of(frames, entries), rows
 
 
-def finder(
-    source: FrameSource, camera: str, detector: LandmarkDetector
-) -> Callable[[int], Landmarks]:
-    """The landmarks of a frame, from its image."""
-    return lambda frame: detector.detect(source.read(camera, frame))
-
-
-def landmark_overlay(
-    source: FrameSource, camera: str, track: LandmarkTrack, count: int = 8, columns: int = 4
-) -> np.ndarray:
+def landmark_overlay(source: FrameSource, camera: str, track: LandmarkTrack) -> np.ndarray:
     """Frames of a track, evenly spread, with their landmarks; (h, w, 3) uint8."""
-    rows = evenly_spaced(len(track.frames), count)
     images = []
-    for row in rows:
+    for row in evenly_spaced(len(track.frames), 8):
         frame = int(track.frames[row])
-        try:
-            image = to_display(source.read(camera, frame))
-        except InputError:
-            image = np.zeros((240, 320, 3), dtype=np.uint8)
+        image = shown_frame(source, camera, frame)
         found = Landmarks(
             track.points_px[row],
             track.confidence[row],
@@ -70,11 +57,11 @@ def landmark_overlay(
         )
         text = f"{frame}" if found.found else f"{frame}: {NOT_FOUND}"
         images.append(label(draw_landmarks(image, found), text))
-    return tile(images, columns)
+    return tile(images, 4)
 
 
 def draw_landmarks(image: np.ndarray, found: Landmarks) -> np.ndarray:
-    """A copy of (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
+    """A copy of `image` (h, w, 3) uint8 with points (green: sure, red: unsure) and both lip contours."""
     if not found.found:
         return image
     dense = found.landmark_set is not IBUG66  # large points would hide the face

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class LandmarkDetector(Protocol):
     landmark_set: LandmarkSet
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of an image (h, w, 3), float32, linear RGB."""
+        """Landmarks of an image `linear_rgb` (h, w, 3) float32."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +104,12 @@ class LandmarkTrack:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        more = {}
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         if self.landmark_set is not IBUG66:
-            more["landmark_set"] = np.array(self.landmark_set.name)
+            arrays["landmark_set"] = np.array(self.landmark_set.name)
         if self.depth_px is not None:
-            more["depth_px"] = self.depth_px.astype(np.float32)
-        write_arrays(path, **{name: getattr(self, name) for name in _ARRAYS}, **more)
+            arrays["depth_px"] = self.depth_px.astype(np.float32)
+        write_arrays(path, **arrays)
 
     @classmethod
     def load(
@@ -131,12 +131,11 @@ class LandmarkTrack:
         parts = [_of_set(part, wanted, path) for part, path in zip(parts, paths, strict=True)]
         order = np.argsort(np.concatenate([part.frames for part in parts]), kind="stable")
         joined = {n: np.concatenate([getattr(p, n) for p in parts])[order] for n in _ARRAYS}
-        depth = [part.depth_px for part in parts]
-        known = all(values is not None for values in depth)
+        depth = [part.depth_px for part in parts if part.depth_px is not None]
         return cls(
             **joined,
             landmark_set=parts[0].landmark_set,
-            depth_px=np.concatenate(depth)[order] if known else None,
+            depth_px=np.concatenate(depth)[order] if len(depth) == len(parts) else None,
         )
 
 

@@ -53,13 +53,18 @@ class FaceFlow:
 
     def __init__(self, face_px: float = 280.0):
         self.face_px = face_px
-        self._flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._flow.setFinestScale(0)
 
     def between(
         self, grey_a: np.ndarray, grey_b: np.ndarray, shape_a: np.ndarray, shape_b: np.ndarray
     ) -> PairFlow:
-        """Flow between two images (h, w) in [0, 1], of a face at about (66, 2) px in each."""
+        """Flow between two images of a face.
+
+        Args:
+            grey_a, grey_b: (h, w) in [0, 1].
+            shape_a, shape_b: (66, 2) px, about where the face is in each.
+        """
         low = [shape.min(axis=0) for shape in (shape_a, shape_b)]
         high = [shape.max(axis=0) for shape in (shape_a, shape_b)]
         size = max(face_size_px(shape_a), face_size_px(shape_b))
@@ -73,13 +78,16 @@ class FaceFlow:
             _crop(grey, corner, extent, target)
             for grey, corner in zip((grey_a, grey_b), corners, strict=True)
         ]
-        forward = self._flow.calc(crops[0], crops[1], None).astype(np.float16)
-        backward = self._flow.calc(crops[1], crops[0], None).astype(np.float16)
-        return PairFlow(forward, backward, *corners, target / extent)
+        forward, backward = self._dense(*crops), self._dense(*crops[::-1])
+        return PairFlow(forward, backward, corners[0], corners[1], target / extent)
+
+    def _dense(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        flow = self._flow.calc(a, b, None)  # type: ignore[call-overload] # the last may be None
+        return flow.astype(np.float16)
 
 
 def carry_along(flows: Sequence[PairFlow], points_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 2) px of the first image in all images of a row (Mono13 eq. 5).
+    """`points_px` (N, 2) of the first image in all images of a row (Mono13 eq. 5).
 
     Returns:
         (len(flows) + 1, N, 2) px, and (len(flows) + 1, N) px how far the flows have not led back,

@@ -5,19 +5,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from vermilion.imaging.images import linear_to_srgb
+from vermilion.imaging.images import LUMINANCE, linear_to_srgb
 
 N_ORIENTATIONS = 8
-_LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 def grey_of(linear_rgb: np.ndarray) -> np.ndarray:
-    """Display brightness (h, w) float32 in [0, 1] of linear RGB (h, w, 3)."""
-    return linear_to_srgb(linear_rgb @ _LUMA)
+    """Display brightness (h, w) float32 in [0, 1] of `linear_rgb` (h, w, 3)."""
+    return linear_to_srgb(linear_rgb @ LUMINANCE)
 
 
 def orientation_channels(grey: np.ndarray) -> np.ndarray:
-    """Gradient magnitude shared between the two nearest of 8 unsigned orientations, (h, w, 8)."""
+    """Gradient magnitude of `grey` (h, w) shared between the two nearest of 8 unsigned orientations,
+    (h, w, 8)."""
     dx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=1, borderType=cv2.BORDER_REPLICATE)
     dy = cv2.Sobel(grey, cv2.CV_32F, 0, 1, ksize=1, borderType=cv2.BORDER_REPLICATE)
     magnitude, angle = cv2.cartToPolar(dx, dy)
@@ -58,7 +58,8 @@ def patch_features(
 
 
 def cell_map(grey: np.ndarray, cell_px: int) -> np.ndarray:
-    """Orientation histograms of square cells, normalised by their surroundings, (h', w', 8)."""
+    """Orientation histograms of square cells of `grey` (h, w), normalised by what is round them:
+    (h // cell_px, w // cell_px, 8)."""
     height, width = grey.shape[0] // cell_px, grey.shape[1] // cell_px
     channels = orientation_channels(grey[: height * cell_px, : width * cell_px])
     cells = cv2.resize(channels, (width, height), interpolation=cv2.INTER_AREA)

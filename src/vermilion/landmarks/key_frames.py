@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vermilion.landmarks.appearance import AppearanceSettings, ReferenceShape, describe
+from vermilion.landmarks.binary_patterns import PatternSettings, ReferenceShape, describe
 from vermilion.landmarks.descent import ImageSimilarity
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import N_LANDMARKS
 from vermilion.storage.arrays import read_arrays, write_arrays
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 from vermilion.storage.progress import progress
 
 #: Where a key frame comes from: a person or another tracker; like the neutral; divides a clip.
@@ -65,18 +65,13 @@ class KeyFrames:
         """A row a frame of the take: its distances and, for key frames, what kind they are."""
         kinds = dict(zip(self.frames.tolist(), self.kinds.tolist(), strict=True))
         frames = self.take_frames.tolist()
-        return pd.DataFrame(
-            {
-                "frame": frames,
-                "key_frame": [kinds.get(frame, "") for frame in frames],
-                "region_distance": np.where(
-                    np.isfinite(self.region_distance), self.region_distance, np.nan
-                ),
-                "patch_distance": np.where(
-                    np.isfinite(self.patch_distance), self.patch_distance, np.nan
-                ),
-            }
-        )
+        columns = {
+            "frame": frames,
+            "key_frame": [kinds.get(frame, "") for frame in frames],
+            "region_distance": self.region_distance,
+            "patch_distance": self.patch_distance,
+        }
+        return pd.DataFrame(columns).replace(np.inf, np.nan)
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
@@ -92,7 +87,6 @@ def find_key_frames(
     read_grey: Callable[[int], np.ndarray],
     track: LandmarkTrack,
     given: Mapping[int, np.ndarray],
-    appearance: AppearanceSettings | None = None,
     settings: KeyFrameSettings | None = None,
 ) -> KeyFrames:
     """Compare all frames of a take with the first that has a face, and choose the key frames.
@@ -102,21 +96,18 @@ def find_key_frames(
         track: detected landmarks of the whole take, without the offset from the given ones.
         given: trusted landmarks (66, 2) by frame number.
     """
-    appearance = appearance or AppearanceSettings()
+    patterns = PatternSettings()
     points = track.points_px.copy()
     for row, frame in enumerate(track.frames):
         points[row] = given.get(int(frame), points[row])
     has_points = np.isfinite(points).all(axis=(1, 2))
     region, patch = np.full((2, len(points)), np.inf)
     reference = first = None
-    for row in progress(np.flatnonzero(has_points), "appearance"):
-        try:
-            grey = read_grey(int(track.frames[row]))
-        except InputError:
-            continue
+    rows_with_face = progress(np.flatnonzero(has_points).tolist(), "likeness")
+    for row, grey in readable(rows_with_face, lambda row: read_grey(int(track.frames[row]))):
         if reference is None:
-            reference = ReferenceShape.of(points[row], appearance)
-        look = describe(grey, points[row], reference, appearance)
+            reference = ReferenceShape.of(points[row], patterns)
+        look = describe(grey, points[row], reference, patterns)
         first = first or look
         region[row], patch[row] = first.region_distance(look), first.patch_distance(look)
     is_given = np.isin(track.frames, list(given)) & np.isfinite(region)
@@ -185,6 +176,6 @@ def without_offset(track: LandmarkTrack, given: Mapping[int, np.ndarray]) -> Lan
         off = given[int(track.frames[row])] - track.points_px[row]
         offsets.append(off @ ImageSimilarity.between(track.points_px[row], reference).matrix.T)
     offset, points = np.mean(offsets, axis=0), track.points_px.copy()
-    for row in np.flatnonzero(track.valid):
+    for row in np.flatnonzero(track.valid).tolist():
         points[row] += offset @ ImageSimilarity.between(reference, points[row]).matrix.T
     return replace(track, points_px=points)

@@ -17,7 +17,7 @@ SHARE = 0.75
 
 
 def onto_lips(points_px: np.ndarray) -> np.ndarray:
-    """Landmarks (..., 66, 2) px with those of the inner contour moved onto the lips."""
+    """`points_px` (..., 66, 2) with those of the inner contour moved onto the lips."""
     points = points_px.copy()
     outer = points[..., LIP_OUTER_FACING, :]
     points[..., LIP_INNER_OPEN, :] = outer + SHARE * (points[..., LIP_INNER_OPEN, :] - outer)
@@ -25,7 +25,7 @@ def onto_lips(points_px: np.ndarray) -> np.ndarray:
 
 
 def off_lips(points_px: np.ndarray) -> np.ndarray:
-    """The inverse: landmarks (..., 66, 2) px with the inner contour where it belongs."""
+    """The inverse: `points_px` (..., 66, 2) with the inner contour where it belongs."""
     points = points_px.copy()
     outer = points[..., LIP_OUTER_FACING, :]
     points[..., LIP_INNER_OPEN, :] = outer + (points[..., LIP_INNER_OPEN, :] - outer) / SHARE

@@ -32,19 +32,18 @@ class FaceLocator:
     bias: float
 
     def locate(self, grey: np.ndarray, count: int = 4) -> list[tuple[np.ndarray, float, float]]:
-        """The likeliest faces: (centre (2,) px, face size px, score), best first, apart."""
+        """The likeliest faces in `grey` (h, w): (centre (2,) px, size px, score), best first, apart."""
         found = []
         for scale, cells, pad in pyramid(grey):
-            score = sum(
-                cv2.filter2D(
+            score = np.zeros(cells.shape[:2], dtype=np.float32)
+            for k in range(N_ORIENTATIONS):
+                score += cv2.filter2D(
                     cells[..., k],
                     cv2.CV_32F,
                     self.weights[..., k],
                     borderType=cv2.BORDER_CONSTANT,
                     anchor=(0, 0),
                 )
-                for k in range(N_ORIENTATIONS)
-            )
             score = score[: -WINDOW_CELLS + 1, : -WINDOW_CELLS + 1] + self.bias
             peak = score >= cv2.dilate(score, np.ones((3, 3)))
             rows, columns = np.nonzero(peak)
@@ -57,7 +56,7 @@ class FaceLocator:
 
 
 def pyramid(grey: np.ndarray):
-    """Cell maps (scale, cells, pad) of the image, widened by `pad` px, at each face size."""
+    """Cell maps (scale, cells, pad) of `grey` (h, w), widened by `pad` px, at each face size."""
     window = WINDOW_CELLS * CELL_PX / WINDOW_PER_FACE
     shrink = min(1.0, 1.1 * window / (SMALLEST_FACE * min(grey.shape)))
     if shrink < 1:

@@ -11,8 +11,8 @@ import os
 import struct
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numba
 import numpy as np
@@ -29,21 +29,6 @@ _STEPS = 65535
 _DISPLAY = np.rint(linear_to_srgb(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
 
 
-@dataclass(frozen=True)
-class MeshFace:
-    """One face in an image.
-
-    Attributes:
-        points_px: (478, 2) float64; the centre of the top-left pixel is (0.5, 0.5).
-        depth_px: (478,) away from the camera, in the same unit, from an origin near the head's middle.
-        presence: probability that there is a face, [0, 1].
-    """
-
-    points_px: np.ndarray
-    depth_px: np.ndarray
-    presence: float
-
-
 class MediapipeDetector:
     """Landmarks of each image by itself, so that chunks do not matter.
 
@@ -56,20 +41,18 @@ class MediapipeDetector:
     def __init__(self, environment: str | Path):
         """`environment`: folder of the virtual environment. Raises InputError where it is absent."""
         self._python = environment_python(environment)
-        self._process: subprocess.Popen | None = None
-        self._messages = None
+        self._process: subprocess.Popen[bytes] | None = None
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of the largest face in an image (h, w, 3), float32, linear RGB."""
+        """Landmarks of the largest face in `linear_rgb` (h, w, 3) float32."""
         faces = self.faces(linear_rgb)
-        if not faces:
-            return Landmarks.none(self.landmark_set)
-        face = faces[0]
-        confidence = np.full(len(face.points_px), face.presence)
-        return Landmarks(face.points_px, confidence, True, self.landmark_set, face.depth_px)
+        return faces[0] if faces else Landmarks.none(self.landmark_set)
 
-    def faces(self, linear_rgb: np.ndarray, max_faces: int = MAX_FACES) -> list[MeshFace]:
-        """All faces in an image (h, w, 3), float32, linear RGB, the largest first.
+    def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
+        """Up to `MAX_FACES` faces in `linear_rgb` (h, w, 3) float32, the largest first.
+
+        The confidence of all points of a face is the probability that there is a face; depths are
+        from an origin near the head's middle.
 
         Raises:
             InputError: the process of the network ended.
@@ -79,9 +62,9 @@ class MediapipeDetector:
         if self._process is None:
             self._start()
         try:
-            self._process.stdin.write(struct.pack("<3I", height, width, max_faces))
-            self._process.stdin.write(memoryview(pixels).cast("B"))
-            self._process.stdin.flush()
+            self._images.write(struct.pack("<3I", height, width, MAX_FACES))
+            self._images.write(memoryview(pixels).cast("B"))
+            self._images.flush()
         except OSError as error:
             raise self._ended() from error
         count = struct.unpack("<I", self._read(4))[0]
@@ -90,9 +73,9 @@ class MediapipeDetector:
     def close(self) -> None:
         """End the process; the next image would start it again."""
         if self._process is not None:
-            self._process.stdin.close()
+            self._images.close()
             self._process.wait()
-            self._process.stdout.close()
+            self._answers.close()
             self._messages.close()
             self._process = None
 
@@ -109,7 +92,7 @@ class MediapipeDetector:
             "GLOG_minloglevel": "2",
             "TF_CPP_MIN_LOG_LEVEL": "2",
         }
-        self._messages = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
+        self._messages: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
         # Isolated: neither this package's folder nor its packages may be imported over there.
         self._process = subprocess.Popen(
             [str(self._python), "-I", mediapipe_runner.__file__],
@@ -118,24 +101,29 @@ class MediapipeDetector:
             stderr=self._messages,
             env=environment,
         )
+        assert (
+            self._process.stdin is not None and self._process.stdout is not None
+        )  # both are pipes
+        self._images, self._answers = self._process.stdin, self._process.stdout
         if self._read(len(mediapipe_runner.MAGIC)) != mediapipe_runner.MAGIC:
             raise self._ended()
 
-    def _face(self) -> MeshFace:
+    def _face(self) -> Landmarks:
         n_points = self.landmark_set.n_points
         values = np.frombuffer(self._read(4 * (1 + 2 * n_points * 3)), "<f4").astype(np.float64)
         points, mirrored = values[1:].reshape(2, n_points, 3)
         mean = 0.5 * (points + mirrored[self.landmark_set.mirror])
-        return MeshFace(mean[:, :2], mean[:, 2], float(np.clip(values[0], 0.0, 1.0)))
+        confidence = np.full(n_points, float(np.clip(values[0], 0.0, 1.0)))
+        return Landmarks(mean[:, :2], confidence, True, self.landmark_set, mean[:, 2])
 
     def _read(self, count: int) -> bytes:
-        data = self._process.stdout.read(count)
+        data = self._answers.read(count)
         if len(data) < count:
             raise self._ended()
         return data
 
     def _ended(self) -> InputError:
-        status = self._process.wait()
+        status = self._process.wait() if self._process else None
         self._messages.seek(0)
         lines = self._messages.read().decode(errors="replace").strip().splitlines()
         self._process, said = None, lines[-1] if lines else "nothing"

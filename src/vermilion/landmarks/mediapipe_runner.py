@@ -20,7 +20,6 @@ from __future__ import annotations
 import os
 import struct
 import sys
-from functools import partial
 
 import cv2
 import numpy as np
@@ -54,29 +53,23 @@ class FaceMesh:
         self._found, self._stamp = {}, 0
         readers = {"landmarks": packet_getter.get_proto, self._score: packet_getter.get_float}
         for name, read in readers.items():
-            keep = partial(self._keep, read)
-            self._graph.observe_output_stream(name, keep)
+            self._graph.observe_output_stream(name, self._keeper(read))
         self._graph.start_run({"with_attention": packet_creator.create_bool(True)})
 
-    def _keep(self, read, name, packet):
-        self._found[name] = read(packet)
+    def _keeper(self, read):
+        return lambda name, packet: self._found.update({name: read(packet)})
 
     def __call__(self, crop: np.ndarray) -> tuple[np.ndarray, float]:
         """Points (478, 3) in pixels of a crop (192, 192, 3) uint8 RGB, and the presence of a face."""
         from mediapipe.framework.formats import rect_pb2
-        from mediapipe.python import packet_creator
-        from mediapipe.python._framework_bindings import image_frame
+        from mediapipe.python._framework_bindings.image_frame import ImageFormat, ImageFrame
+        from mediapipe.python.packet_creator import create_image_frame, create_proto
 
         self._found.clear()
         self._stamp += 1
-        frame = image_frame.ImageFrame(
-            image_frame.ImageFormat.SRGB, data=np.ascontiguousarray(crop)
-        )
+        frame = ImageFrame(ImageFormat.SRGB, data=np.ascontiguousarray(crop))
         whole = rect_pb2.NormalizedRect(x_center=0.5, y_center=0.5, width=1.0, height=1.0)
-        packets = {
-            "image": packet_creator.create_image_frame(frame),
-            "roi": packet_creator.create_proto(whole),
-        }
+        packets = {"image": create_image_frame(frame), "roi": create_proto(whole)}
         for name, packet in packets.items():
             self._graph.add_packet_to_input_stream(name, packet.at(self._stamp))
         self._graph.wait_until_idle()
@@ -180,7 +173,8 @@ class FaceFinder:
 
     def __call__(self, image: np.ndarray, max_faces: int) -> list[tuple[float, np.ndarray]]:
         """Presence and points (2, 478, 3) of each face in an image (h, w, 3) uint8 RGB."""
-        faces, boxes = [], []
+        faces: list[tuple[float, np.ndarray]] = []
+        boxes: list[np.ndarray] = []
         for seen in self._detector(image):
             if len(faces) >= max_faces:
                 break
@@ -269,26 +263,15 @@ def _overlap(a: np.ndarray, b: np.ndarray) -> float:
     return float(common / (a[2] ** 2 + b[2] ** 2 - common))
 
 
-def _read(stream, count: int) -> bytes:
-    """`count` bytes, or none where the stream has ended."""
-    data = bytearray()
-    while len(data) < count:
-        piece = stream.read(count - len(data))
-        if not piece:
-            return b""
-        data += piece
-    return bytes(data)
-
-
 def serve(source, sink) -> None:
-    """Answer images until `source` ends."""
+    """Answer images until `source`, whose `read` waits for all bytes, ends."""
     finder = FaceFinder()
     sink.write(MAGIC)
     sink.flush()
-    while header := _read(source, 12):
+    while len(header := source.read(12)) == 12:
         height, width, max_faces = struct.unpack("<3I", header)
-        pixels = _read(source, height * width * 3)
-        if not pixels:
+        pixels = source.read(height * width * 3)
+        if len(pixels) < height * width * 3:
             return
         image = np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)
         faces = finder(image, max_faces)

@@ -17,7 +17,7 @@ _CURVE = linear_to_srgb(np.arange(_STEPS + 2) / _STEPS)
 
 
 def network_input(linear_rgb: np.ndarray) -> np.ndarray:
-    """(3, 224, 224) float32, from (h, w, 3) float32 linear RGB; values beyond [0, 1] are cut off."""
+    """(3, 224, 224) float32 of `linear_rgb` (h, w, 3) float32; values beyond [0, 1] are cut off."""
     # Resized first: the cost does not grow with the image.
     small = cv2.resize(linear_rgb, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
     planes = np.empty((3, SIZE, SIZE), dtype=np.float32)

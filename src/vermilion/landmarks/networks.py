@@ -49,7 +49,7 @@ class NetworkDetector:
         self._landmarks = _session(Path(folder) / LANDMARK_FILE)
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of the face with the highest score times size; see `Landmarks`."""
+        """Landmarks of the face in `linear_rgb` (h, w, 3) with the highest score times size."""
         candidates = self._faces(linear_rgb)
         best = Landmarks.none()
         for box in candidates[:3]:

@@ -91,10 +91,6 @@ class LandmarkSet:
         corners = points_px[..., self.eye_corners, :]
         return np.linalg.norm(corners[..., 0, :] - corners[..., 1, :], axis=-1)
 
-    def to_ibug66(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., N, d) as the 66 of `ibug66`, (..., 66, d)."""
-        return points[..., self.ibug66, :]
-
 
 def set_of(name: str) -> LandmarkSet:
     """The set of a name. Raises InputError for another name."""

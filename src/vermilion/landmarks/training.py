@@ -90,10 +90,10 @@ def train_descent(
             features.append(found.reshape(-1))
             moves.append(((points[i] - shape) @ inverse.T).reshape(-1))
             frames.append(to_image.matrix)
-        features = np.array(features, dtype=np.float32)
-        step = ridge_regression(features, np.array(moves), settings.ridge)
+        table = np.array(features, dtype=np.float32)
+        step = ridge_regression(table, np.array(moves), settings.ridge)
         steps.append(step.astype(np.float16))
-        predicted = features @ step[:-1] + step[-1]
+        predicted = table @ step[:-1] + step[-1]
         predicted = predicted.reshape(len(owner), N_LANDMARKS, 2)
         shapes = shapes + predicted @ np.swapaxes(np.array(frames), 1, 2)
     sureness = _train_sureness(greys, points, mean, stage_sizes(settings.stages)[-1], rng)
@@ -105,7 +105,7 @@ def train_descent(
 def with_mirrors(
     greys: list[np.ndarray], points: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """The images and their mirror images, and their points."""
+    """Images `greys` (h, w) with their mirror images, and `points` (N, 66, 2) with theirs (2N, 66, 2)."""
     flipped = points[:, MIRROR].copy()
     widths = np.array([grey.shape[1] for grey in greys])
     flipped[..., 0] = widths[:, None] - flipped[..., 0]
@@ -114,7 +114,7 @@ def with_mirrors(
 
 
 def mean_shape(points: np.ndarray, rounds: int = 5) -> np.ndarray:
-    """Mean of shapes (N, 66, 2) after similarity alignment: size 1, box about the origin."""
+    """Mean (66, 2) of shapes `points` (N, 66, 2) after similarity alignment: size 1, box about the origin."""
     mean = _normalised(points[0])
     for _ in range(rounds):
         aligned = [ImageSimilarity.between(shape, mean)(shape) for shape in points]
@@ -144,7 +144,8 @@ def _start(
 def ridge_regression(features: np.ndarray, targets: np.ndarray, ridge: float) -> np.ndarray:
     """Weights (P + 1, Q) of least squares with offset, in the dual: N samples, P >> N features.
 
-    Minimises |X w - y|^2 + ridge * trace(X X') |w|^2 with centred X (N, P), y (N, Q).
+    Minimises |X w - y|^2 + ridge * trace(X X') |w|^2 with centred X and y: `features` (N, P) and
+    `targets` (N, Q).
     """
     centre, middle = features.mean(axis=0), targets.mean(axis=0)
     x = features - centre

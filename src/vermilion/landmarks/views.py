@@ -39,15 +39,9 @@ class LandmarkViews:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(
-            path,
-            cameras=self.cameras,
-            points_px=self.points_px,
-            confidence=self.confidence,
-        )
+        write_arrays(path, **vars(self))
 
     @classmethod
     def load(cls, path: str | Path) -> LandmarkViews:
         """Read what `save` wrote."""
-        names = ("cameras", "points_px", "confidence")
-        return cls(**read_arrays(path, "file of landmark views", names))
+        return cls(**read_arrays(path, "file of landmark views", cls.__dataclass_fields__))

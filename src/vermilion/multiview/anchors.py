@@ -19,7 +19,7 @@ from vermilion.multiview.motion import Reference
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.refine import FrameMatchSettings, register_frame
 from vermilion.multiview.views import Frame
-from vermilion.storage.errors import InputError
+from vermilion.storage.frames import readable
 
 LoadFrame = Callable[[int], Frame]
 
@@ -96,17 +96,17 @@ def find_anchor(
     Args:
         load: reads a frame at the reference's resolution; raises InputError if it cannot.
     """
-    window = np.array(window, dtype=np.int64)
+    numbers = np.array(window, dtype=np.int64)
     similarity = similarities(reference, window, load)
     best = choose_anchor(similarity, settings.anchor_similarity)
     if best is None:
-        return Anchor(-1, np.zeros((0, 3)), window, similarity)
-    number = int(window[best])
+        return Anchor(-1, np.zeros((0, 3)), numbers, similarity)
+    number = int(numbers[best])
     frame = load(number)
     levels = [(reference, frame, 2 * settings.length_mm), (reference, frame, settings.length_mm)]
     match = FrameMatchSettings(settings.sigma_px, settings.max_step_mm, settings.min_agreement)
     found = register_frame(levels, reference.vertices_mm, matcher, match)
-    return Anchor(number, found.vertices_mm, window, similarity)
+    return Anchor(number, found.vertices_mm, numbers, similarity)
 
 
 def choose_anchor(similarity: np.ndarray, threshold: float) -> int | None:
@@ -126,11 +126,7 @@ def similarities(reference: Reference, frames: Sequence[int], load: LoadFrame) -
     views = reference.frame.views
     masks = {name: caster.see(view.camera).hit for name, view in views.items()}
     similarity = np.full(len(frames), np.nan)
-    for index, number in enumerate(frames):
-        try:
-            frame = load(int(number))
-        except InputError:
-            continue
+    for index, frame in readable(range(len(frames)), lambda index: load(int(frames[index]))):
         values = [
             _correlation(views[name].normalised, view.normalised, masks[name])
             for name, view in frame.views.items()

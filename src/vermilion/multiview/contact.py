@@ -11,6 +11,9 @@ from vermilion.faces.lips import lip_sides_by_distance
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh, adjacency, vertex_normals
 
+#: Deeper than this is no contact of two lips; depth that is let be; rounds of pushing.
+_REACH_MM, _SLACK_MM, _ROUNDS = 4.0, 0.02, 8
+
 
 @dataclass(frozen=True)
 class Lips:
@@ -53,10 +56,6 @@ def resolve_contact(
     triangles: np.ndarray,
     lips: Lips,
     mobility: np.ndarray,
-    *,
-    reach_mm: float = 4.0,
-    slack_mm: float = 0.02,
-    rounds: int = 8,
 ) -> Contact:
     """Push apart what lies inside the other lip, each side by its share of mobility.
 
@@ -65,8 +64,6 @@ def resolve_contact(
         triangles: (T, 3).
         lips: of the topology.
         mobility: (V,) in (0, 1]; vertices that cameras see move less.
-        reach_mm: deeper than this is no contact of these two surfaces.
-        slack_mm: depth that is let be.
     """
     current = np.array(vertices_mm, dtype=np.float64)
     first = 0.0
@@ -75,13 +72,13 @@ def resolve_contact(
     mix = mix.multiply(1.0 / np.maximum(np.asarray(mix.sum(axis=1)), 1)).tocsr()
     free = np.zeros(len(current), dtype=bool)
     free[lips.upper] = free[lips.lower] = True
-    for index in range(rounds + 1):
+    for index in range(_ROUNDS + 1):
         normals = vertex_normals(current, triangles)
         push = np.zeros_like(current)
         deepest, inside = 0.0, 0
         for mine, other in ((lips.upper, lips.lower), (lips.lower, lips.upper)):
-            ids, near, depth = _penetration(current, normals, mine, other, reach_mm)
-            deep = depth > slack_mm
+            ids, near, depth = _penetration(current, normals, mine, other)
+            deep = depth > _SLACK_MM
             ids, near, depth = ids[deep], near[deep], depth[deep]
             inside += len(ids)
             deepest = max(deepest, float(depth.max(initial=0.0)))
@@ -90,7 +87,7 @@ def resolve_contact(
             _keep_longer(push, near, -((1 - share) * depth)[:, None] * normals[near])
         if index == 0:
             first, count = deepest, inside
-        if inside == 0 or index == rounds:
+        if inside == 0 or index == _ROUNDS:
             return Contact(current, count, first, deepest)
         # neighbours on the lips come along by half, so that no single vertex stands out
         along = mix @ push
@@ -100,10 +97,10 @@ def resolve_contact(
     raise AssertionError("unreachable")
 
 
-def _penetration(vertices, normals, mine, other, reach_mm):
+def _penetration(vertices, normals, mine, other):
     """(vertices inside the other lip, their nearest vertices there, depth in mm)."""
     distance, nearest = cKDTree(vertices[other]).query(
-        vertices[mine], distance_upper_bound=reach_mm
+        vertices[mine], distance_upper_bound=_REACH_MM
     )
     found = np.isfinite(distance)
     ids, near, distance = mine[found], other[nearest[found]], distance[found]

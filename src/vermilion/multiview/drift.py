@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -91,6 +92,7 @@ class Carried:
     def difference(self) -> np.ndarray:
         """(h, w) of the window: absolute difference in local deviations, zero without prediction."""
         found = self.comparison
+        assert found is not None, "nothing is compared where the camera sees nothing"
         return np.abs(found.predicted.astype(np.float32) - found.real) / DEVIATION
 
 
@@ -141,7 +143,7 @@ def neighbours(frame: Frame, target_mm: np.ndarray) -> dict[str, str]:
         return convergence_deg(cameras[a], cameras[b], target_mm) * max(ratio, 1 / ratio) ** 4
 
     return {
-        name: min((other for other in cameras if other != name), key=lambda o, n=name: unlike(n, o))
+        name: min((other for other in cameras if other != name), key=partial(unlike, name))
         for name in cameras
     }
 
@@ -198,7 +200,9 @@ def _samples(origin: Origin, found: Carried, scale: float) -> _Samples:
         length_mm[name] = length[chosen] / found.px_per_mm[chosen]
         difference[name] = np.zeros(0)
         if found.comparison is not None:
-            difference[name] = _difference_in(found, origin.regions[name])
+            difference[name] = _difference_in(
+                found.comparison, found.difference(), origin.regions[name]
+            )
     skin = origin.regions["skin"]
     return _Samples(
         int((found.seen & skin).sum()),
@@ -209,16 +213,16 @@ def _samples(origin: Origin, found: Carried, scale: float) -> _Samples:
     )
 
 
-def _difference_in(found: Carried, region: np.ndarray) -> np.ndarray:
-    """Differences at the rays (n,) that meet a region and have a prediction."""
-    raster = found.comparison.raster
+def _difference_in(found: Comparison, difference: np.ndarray, region: np.ndarray) -> np.ndarray:
+    """Differences (h, w) at the rays (n,) that meet a region and have a prediction."""
+    raster = found.raster
     rows, columns = np.nonzero(raster.hits.hit & region[raster.corners].all(axis=2))
-    height, width = found.comparison.mask.shape
+    height, width = found.mask.shape
     stride_y, stride_x = height / raster.hits.hit.shape[0], width / raster.hits.hit.shape[1]
     y = ((rows + 0.5) * stride_y).astype(int)
     x = ((columns + 0.5) * stride_x).astype(int)
-    predicted = found.comparison.mask[y, x]
-    return found.difference()[y[predicted], x[predicted]]
+    predicted = found.mask[y, x]
+    return difference[y[predicted], x[predicted]]
 
 
 def _row(number: int, camera: str, parts: list[_Samples], reason: str = "") -> dict:

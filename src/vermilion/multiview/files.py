@@ -70,29 +70,21 @@ def read_neutral(path: str | Path, n_vertices: int, **place) -> np.ndarray:
 
 def write_anchor(path: str | Path, anchor: Anchor) -> None:
     """`.npz`: frame; vertices_mm (V, 3); window, similarity (W,)."""
-    write_arrays(
-        path,
-        frame=np.array(anchor.frame),
-        vertices_mm=anchor.vertices_mm,
-        window=anchor.window,
-        similarity=anchor.similarity,
-    )
+    write_arrays(path, **vars(anchor))
 
 
 def read_anchor(path: str | Path) -> Anchor:
     """What `write_anchor` wrote."""
     arrays = _load(path, ("frame", "vertices_mm", "window", "similarity"))
-    return Anchor(**{**arrays, "frame": int(arrays["frame"])})
+    return Anchor(
+        int(arrays["frame"]), arrays["vertices_mm"], arrays["window"], arrays["similarity"]
+    )
 
 
 def write_clip(path: str | Path, clip: Clip) -> None:
     """`.npz`: frames (F,); coarse_mm (F, V, 3) float32; reasons."""
-    write_arrays(
-        path,
-        frames=clip.frames,
-        coarse_mm=clip.coarse_mm.astype(np.float32),
-        reasons=np.array(clip.reasons, dtype=str),
-    )
+    coarse, reasons = clip.coarse_mm.astype(np.float32), np.array(clip.reasons, dtype=str)
+    write_arrays(path, frames=clip.frames, coarse_mm=coarse, reasons=reasons)
 
 
 def read_clip(path: str | Path) -> Clip:
@@ -104,14 +96,7 @@ def read_clip(path: str | Path) -> Clip:
 
 def write_track(path: str | Path, track: Track) -> None:
     """`.npz`: frames, coarse_mm (F, V, 3) float32, similarity, anchors, reasons."""
-    write_arrays(
-        path,
-        frames=track.frames,
-        coarse_mm=track.coarse_mm,
-        similarity=track.similarity,
-        anchors=track.anchors,
-        reasons=np.array(track.reasons, dtype=str),
-    )
+    write_arrays(path, **{**vars(track), "reasons": np.array(track.reasons, dtype=str)})
 
 
 def read_track(path: str | Path, frames: Sequence[int]) -> np.ndarray:

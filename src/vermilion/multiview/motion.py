@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
+from vermilion.multiview.pairs import density
 from vermilion.multiview.photometric import Sight, sight
 from vermilion.multiview.solver import DisplacementSolver, ThinPlate
 from vermilion.multiview.stereo import Cloud
@@ -55,10 +56,7 @@ class Reference:
         plate = ThinPlate.of(vertices_mm, triangles) if plate is None else plate
         sights = see_all(frame, vertices_mm, triangles)
         centre = vertices_mm.mean(axis=0)
-        densities = [
-            view.camera.calibration[0, 0] / view.camera.to_camera(centre)[2]
-            for view in frame.views.values()
-        ]
+        densities = [density(view.camera, centre) for view in frame.views.values()]
         return cls(frame, vertices_mm, triangles, sights, plate, float(np.median(densities)))
 
 
@@ -174,7 +172,9 @@ def solve_motion(
         the step (V, 3) and how well it explains the measurements.
     """
     missing = plate.missing(current_mm) if settings.keep_shape else None
-    solver, step, robust = None, None, measured.weights
+    solver: DisplacementSolver | None = None
+    step: np.ndarray | None = None
+    robust = measured.weights
     jacobians = measured.jacobians / settings.px_per_mm
     offsets = measured.offsets_px / settings.px_per_mm
     for _ in range(settings.rounds):
@@ -196,6 +196,7 @@ def solve_motion(
         explained = (flat @ step[:, :, None]).reshape(n, -1, 2).transpose(1, 0, 2)
         left = np.linalg.norm(explained - offsets, axis=2) * settings.px_per_mm
         robust = measured.weights / (1 + (left / (3 * settings.sigma_px)) ** 2)
+    assert step is not None  # there is a round
     length = np.linalg.norm(step, axis=1, keepdims=True)
     step = step * np.minimum(1.0, settings.max_step_mm / np.maximum(length, 1e-12))
     return Solution(step, robust, left)

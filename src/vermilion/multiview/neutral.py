@@ -13,7 +13,7 @@ from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
 from vermilion.multiview.nonrigid import register_to_cloud
 from vermilion.multiview.pairs import candidate_pairs, stereo_pairs
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.polish import polish
+from vermilion.multiview.polish import PairedImages, polish
 from vermilion.multiview.solver import ThinPlate
 from vermilion.multiview.stereo import Cloud, StereoSettings, match_pair
 from vermilion.multiview.template_fit import deform_to_landmarks, fit_template
@@ -125,16 +125,8 @@ def register_neutral(
     cloud = near_mesh(cloud, Mesh(placed, model.triangles), settings.last_gate_mm, skin, 0.3)
     surface = screened_poisson(cloud, settings.poisson_depth, 2 * stereo.spacing_mm)
     pairs = _polish_pairs(frame, target, stereo, settings)
-    polished, information = polish(
-        frame,
-        placed,
-        model.triangles,
-        pairs,
-        matcher,
-        lengths_mm=settings.polish_lengths_mm,
-        sigma_px=settings.sigma_px,
-        max_offset_mm=settings.last_gate_mm,
-    )
+    images = PairedImages(frame, pairs, matcher, settings.sigma_px, settings.last_gate_mm)
+    polished, information = polish(images, placed, model.triangles, settings.polish_lengths_mm)
     return Neutral(polished, information, landmarks, cloud, surface)
 
 
@@ -171,10 +163,7 @@ def _polish_pairs(
 ) -> list[tuple[str, str]]:
     """Pairs of cameras whose images are compared on the surface round a point (3,)."""
     cameras = {name: view.camera for name, view in frame.views.items()}
-    return candidate_pairs(
-        cameras,
-        target_mm,
-        min_angle_deg=settings.polish_min_angle_deg,
-        max_angle_deg=settings.polish_max_angle_deg,
-        max_density_ratio=1.5,
-    ) or stereo_pairs(cameras, target_mm, stereo.pairs)
+    found = candidate_pairs(
+        cameras, target_mm, settings.polish_min_angle_deg, settings.polish_max_angle_deg
+    )
+    return found or stereo_pairs(cameras, target_mm, stereo.pairs)

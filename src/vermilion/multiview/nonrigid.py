@@ -11,6 +11,10 @@ from vermilion.geometry.mesh import vertex_normals
 from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.stereo import Cloud
 
+#: Smallest cosine between the normals of vertex and point; weight of the tangential part of a match,
+#: against 1 for the normal part.
+_MIN_COSINE, _SLIDE = 0.5, 0.02
+
 
 def register_to_cloud(
     vertices_mm: np.ndarray,
@@ -18,11 +22,9 @@ def register_to_cloud(
     cloud: Cloud,
     matchable: np.ndarray,
     *,
-    lengths_mm: Sequence[float],
-    gates_mm: Sequence[float],
+    lengths_mm: Sequence[float] | np.ndarray,
+    gates_mm: Sequence[float] | np.ndarray,
     spacing_mm: float,
-    min_cosine: float = 0.5,
-    slide: float = 0.02,
 ) -> np.ndarray:
     """Point-to-plane registration with annealed stiffness (after Amberg et al. 2007), (V, 3) mm.
 
@@ -31,12 +33,10 @@ def register_to_cloud(
         triangles: (T, 3).
         cloud: in the same world.
         matchable: (V,) bool; others follow the smooth prior.
-        lengths_mm: stiffness of each round (see `solver`), falling.
-        gates_mm: largest distance of a match of each round.
+        lengths_mm: (R,) stiffness of each round (see `solver`), falling.
+        gates_mm: (R,) largest distance of a match of each round.
         spacing_mm: of the cloud; a match that lies to the side by more than twice as much is past
             the cloud's border and dropped.
-        min_cosine: smallest cosine between the normals of vertex and point.
-        slide: weight of the tangential part of a match, against 1 for the normal part.
     """
     tree = cKDTree(cloud.points_mm)
     current = vertices_mm.copy()
@@ -50,12 +50,12 @@ def register_to_cloud(
         normal = cloud.normals[nearest]
         height = (offset * normal).sum(axis=1)
         aside = np.linalg.norm(offset - height[:, None] * normal, axis=1)
-        alike = (normal * normals).sum(axis=1) >= min_cosine
+        alike = (normal * normals).sum(axis=1) >= _MIN_COSINE
         good = found & alike & matchable & (np.abs(height) < gate) & (aside < 2 * spacing_mm)
         scale = max(1.4826 * np.median(np.abs(height[good])) if good.any() else 1.0, 0.05)
         weight = np.where(good, 1.0 / np.maximum(np.abs(height) / (2 * scale), 1.0), 0.0)
         outer = normal[:, :, None] * normal[:, None, :]
-        blocks = weight[:, None, None] * (outer + slide * np.eye(3))
+        blocks = weight[:, None, None] * (outer + _SLIDE * np.eye(3))
         right = weight[:, None] * height[:, None] * normal
         # stiffness acts on the whole displacement since the start, so that rounds do not add up
         moved = current - vertices_mm

@@ -8,17 +8,21 @@ import cv2
 import numpy as np
 
 from vermilion.geometry.camera import Camera
-from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, tile
+from vermilion.imaging.draw import colour_map, draw_mesh, draw_points, resized_to_height, tile
 from vermilion.imaging.draw import label as write_label
 from vermilion.multiview.neutral import Neutral
+from vermilion.multiview.pairs import density
 from vermilion.multiview.stereo import Cloud
 from vermilion.multiview.take import RefinedFrame
 from vermilion.multiview.views import Frame, View
 
+_HEIGHT_PX = 360
+
 
 def label(image: np.ndarray, text: str) -> np.ndarray:
     """An image (h, w, 3) uint8 at the sheet's size with a line of text, (h', w', 3) uint8."""
-    return write_label(_reduced(image), text)
+    high = image.shape[0] > _HEIGHT_PX
+    return write_label(resized_to_height(image, _HEIGHT_PX) if high else image, text)
 
 
 def show(view: View) -> np.ndarray:
@@ -81,16 +85,13 @@ def draw_dots(
 
 def pick_cameras(frame: Frame, target_mm: np.ndarray, count: int = 2) -> list[str]:
     """The widest and the closest camera of a frame at target_mm (3,), and further ones between."""
-    density = {
-        name: view.camera.calibration[0, 0] / view.camera.to_camera(target_mm)[2]
-        for name, view in frame.views.items()
-    }
+    sharp = {name: round(density(view.camera, target_mm), 1) for name, view in frame.views.items()}
     inward = {
         name: abs(np.dot(view.camera.rotation[2], _mean_axis(frame)))
         for name, view in frame.views.items()
     }
-    order = sorted(density, key=lambda name: (round(density[name], 1), -inward[name]))
-    closest = [n for n in order if round(density[n], 1) == round(density[order[-1]], 1)]
+    order = sorted(sharp, key=lambda name: (sharp[name], -inward[name]))
+    closest = [name for name in order if sharp[name] == sharp[order[-1]]]
     picks = [order[0], closest[0], closest[-1], order[len(order) // 2]]
     return list(dict.fromkeys(picks))[:count]
 
@@ -182,12 +183,3 @@ def frames_sheet(
     if not images:  # no frame of the chunk could be registered
         images = [label(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
     return tile(images, 5)
-
-
-def _reduced(image: np.ndarray, height_px: int = 360) -> np.ndarray:
-    """At most `height_px` high."""
-    height, width = image.shape[:2]
-    if height <= height_px:
-        return image
-    size = (round(width * height_px / height), height_px)
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)

@@ -12,6 +12,9 @@ from vermilion.geometry.camera import Camera, pinhole
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.storage.errors import InputError
 
+#: Largest ratio of the resolutions of a pair, and the angles between the rays of a stereo pair.
+_DENSITY_RATIO, _STEREO_DEG = 1.5, (2.0, 35.0)
+
 
 def convergence_deg(a: Camera, b: Camera, target_mm: np.ndarray) -> float:
     """Angle between two cameras' rays to target_mm (3,), world."""
@@ -28,17 +31,15 @@ def density(camera: Camera, target_mm: np.ndarray) -> float:
 def candidate_pairs(
     cameras: Mapping[str, Camera],
     target_mm: np.ndarray,
-    *,
     min_angle_deg: float,
     max_angle_deg: float,
-    max_density_ratio: float,
 ) -> list[tuple[str, str]]:
     """All pairs that see target_mm (3,) from similar directions and at similar resolution."""
     pairs = []
     for a, b in combinations(sorted(cameras), 2):
         angle = convergence_deg(cameras[a], cameras[b], target_mm)
         densities = [density(cameras[n], target_mm) for n in (a, b)]
-        if min(densities) <= 0 or max(densities) / min(densities) > max_density_ratio:
+        if min(densities) <= 0 or max(densities) / min(densities) > _DENSITY_RATIO:
             continue
         if min_angle_deg <= angle <= max_angle_deg:
             pairs.append((a, b))
@@ -49,10 +50,6 @@ def stereo_pairs(
     cameras: Mapping[str, Camera],
     target_mm: np.ndarray,
     listed: Sequence[tuple[str, str]] = (),
-    *,
-    min_angle_deg: float = 2.0,
-    max_angle_deg: float = 35.0,
-    max_density_ratio: float = 1.5,
 ) -> list[tuple[str, str]]:
     """The rig's stereo pairs: those listed, else each camera with its nearest neighbour.
 
@@ -60,8 +57,6 @@ def stereo_pairs(
         cameras: by name.
         target_mm: (3,) what they look at, world, mm.
         listed: pairs that are used instead.
-        min_angle_deg, max_angle_deg: between the rays of a pair.
-        max_density_ratio: of the resolutions of a pair.
 
     Raises:
         InputError: a listed camera does not exist, or no pair is left.
@@ -74,14 +69,8 @@ def stereo_pairs(
             "Correct `multiview.stereo.pairs`.",
         )
     if listed:
-        return [tuple(pair) for pair in listed]
-    candidates = candidate_pairs(
-        cameras,
-        target_mm,
-        min_angle_deg=min_angle_deg,
-        max_angle_deg=max_angle_deg,
-        max_density_ratio=max_density_ratio,
-    )
+        return [(a, b) for a, b in listed]
+    candidates = candidate_pairs(cameras, target_mm, *_STEREO_DEG)
     chosen = set()
     for name in cameras:
         mine = [pair for pair in candidates if name in pair]
@@ -91,7 +80,7 @@ def stereo_pairs(
     if not chosen:
         raise InputError(
             f"no stereo pair among {sorted(cameras)}",
-            f"two cameras within {max_angle_deg:g} degrees of each other and of similar resolution",
+            f"two cameras within {_STEREO_DEG[1]:g} degrees of each other and of similar resolution",
             "List pairs in `multiview.stereo.pairs`, or bring the cameras closer together.",
         )
     return sorted(chosen)
@@ -122,15 +111,14 @@ class Rectified:
         k, k_right = self.left.calibration, self.right.calibration
         offset = k[0, 2] - k_right[0, 2]
         depth = k[0, 0] * self.baseline_mm / (disparity_px - offset)
-        local = np.stack(
-            [
-                (pixels[:, 0] - k[0, 2]) / k[0, 0] * depth,
-                (pixels[:, 1] - k[1, 2]) / k[1, 1] * depth,
-                depth,
-            ],
-            axis=1,
-        )
+        local = _directions(k, pixels) * depth[:, None]
         return (local - self.left.translation) @ self.left.rotation
+
+
+def _directions(calibration: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Viewing directions (..., 3) of pixels (..., 2) in a camera's frame, z = 1."""
+    focal, centre = calibration[[0, 1], [0, 1]], calibration[:2, 2]
+    return np.concatenate([(pixels - centre) / focal, np.ones_like(pixels[..., :1])], axis=-1)
 
 
 def rectify(a: Camera, b: Camera, target_mm: np.ndarray, reach_mm: float) -> Rectified:
@@ -171,16 +159,7 @@ def rectified_image(
     Returns:
         the image (h', w') of the turned camera, and (h', w') bool of pixels that the original has.
     """
-    rows = turned.pixel_grid()
-    k = turned.calibration
-    local = np.stack(
-        [
-            (rows[..., 0] - k[0, 2]) / k[0, 0],
-            (rows[..., 1] - k[1, 2]) / k[1, 1],
-            np.ones(rows.shape[:2]),
-        ],
-        axis=-1,
-    )
+    local = _directions(turned.calibration, turned.pixel_grid())
     in_original = local @ (original.rotation @ turned.rotation.T).T
     ko = original.calibration
     x = in_original[..., 0] / in_original[..., 2] * ko[0, 0] + ko[0, 2]

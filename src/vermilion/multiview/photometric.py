@@ -13,6 +13,9 @@ from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.views import View
 
+#: Cosine of a vertex that faces the camera; how far in front of a vertex the mesh may lie.
+_MIN_COSINE, _TOLERANCE_MM = 0.15, 0.3
+
 
 @dataclass(frozen=True)
 class Sight:
@@ -48,9 +51,6 @@ def sight(
     camera: Camera,
     vertices_mm: np.ndarray,
     normals: np.ndarray | None = None,
-    *,
-    min_cosine: float = 0.15,
-    tolerance_mm: float = 0.3,
 ) -> Sight:
     """Project and test the visibility of a mesh's vertices.
 
@@ -59,16 +59,14 @@ def sight(
         camera: in its world.
         vertices_mm: (V, 3) world, mm.
         normals: (V, 3) unit; None: they are found here.
-        min_cosine: of a vertex that faces the camera.
-        tolerance_mm: how far in front of a vertex the mesh may lie.
     """
     if normals is None:
         normals = vertex_normals(vertices_mm, caster.triangles)
     towards = camera.centre_mm - vertices_mm
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     cosine = (towards * normals).sum(axis=1)
-    visible = cosine > min_cosine
-    visible[visible] = caster.visible(camera, vertices_mm[visible], tolerance_mm)
+    visible = cosine > _MIN_COSINE
+    visible[visible] = caster.visible(camera, vertices_mm[visible], _TOLERANCE_MM)
     return Sight(camera.project(vertices_mm), visible, cosine)
 
 
@@ -165,7 +163,7 @@ class FlowMatcher:
         smoothness costs half of the accuracy on a tattoo (measured), and the mesh is the better
         regulariser.
         """
-        self._flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self._flow.setFinestScale(0)
         self._flow.setPatchStride(4)
         self._flow.setGradientDescentIterations(12)
@@ -174,7 +172,8 @@ class FlowMatcher:
 
     def flow(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Flow (h, w, 2) px with a(x) ~ b(x + flow(x)), of a and b (h, w) uint8."""
-        return self._flow.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), None)
+        a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
+        return self._flow.calc(a, b, None)  # type: ignore[call-overload] # the last may be None
 
     def agreement(
         self, a: np.ndarray, b: np.ndarray, flow: np.ndarray, mask: np.ndarray
@@ -215,7 +214,9 @@ def _along(image: np.ndarray, flow: np.ndarray, border: int) -> np.ndarray:
     height, width = flow.shape[:2]
     x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     places = np.stack([x, y], axis=-1) + flow
-    return cv2.remap(image, places, None, cv2.INTER_LINEAR, borderMode=border)
+    return cv2.remap(  # type: ignore[call-overload] # the stub wants a second map
+        image, places, None, cv2.INTER_LINEAR, borderMode=border
+    )
 
 
 @dataclass(frozen=True)

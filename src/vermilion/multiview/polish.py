@@ -7,6 +7,7 @@ the ray of the first camera, says how far the surface lies in front of or behind
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,52 +18,57 @@ from vermilion.multiview.solver import ThinPlate, solve_displacement
 from vermilion.multiview.views import Frame
 
 
-def normal_offsets(
-    frame: Frame,
-    vertices_mm: np.ndarray,
-    triangles: np.ndarray,
-    pairs: Sequence[tuple[str, str]],
-    matcher: FlowMatcher,
-    *,
-    sigma_px: float,
-    max_offset_mm: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the real surface from each vertex along its normal, from all pairs.
+@dataclass(frozen=True)
+class PairedImages:
+    """Images of one moment that are compared on a surface.
 
-    Args:
+    Attributes:
         frame: with its images.
-        vertices_mm: (V, 3) world, mm.
-        triangles: (T, 3).
         pairs: of cameras.
         matcher: of images.
         sigma_px: expected error of a measurement.
         max_offset_mm: farther offsets do not count.
+    """
+
+    frame: Frame
+    pairs: Sequence[tuple[str, str]]
+    matcher: FlowMatcher
+    sigma_px: float
+    max_offset_mm: float
+
+
+def normal_offsets(
+    images: PairedImages, vertices_mm: np.ndarray, triangles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of the real surface from each vertex along its normal, from all pairs.
+
+    Args:
+        images: that are compared.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
 
     Returns:
         (offset (V,) mm, information (V,) 1/mm^2, zero where no pair sees the vertex).
     """
+    views, sigma_px = images.frame.views, images.sigma_px
     caster = RayCaster(vertices_mm, triangles)
     normals = vertex_normals(vertices_mm, triangles)
-    sights = {
-        name: sight(caster, view.camera, vertices_mm, normals) for name, view in frame.views.items()
-    }
-    rasters = {
-        name: rasterise(caster, view.camera, sights[name]) for name, view in frame.views.items()
-    }
+    sights = {n: sight(caster, view.camera, vertices_mm, normals) for n, view in views.items()}
+    rasters = {n: rasterise(caster, view.camera, sights[n]) for n, view in views.items()}
     offsets, weights = [], []
-    for source, target in (way for a, b in pairs for way in ((a, b), (b, a))):
+    for source, target in (way for a, b in images.pairs for way in ((a, b), (b, a))):
         motion = measure_motion(
-            matcher,
+            images.matcher,
             rasters[target],
             sights[target],
-            frame.views[target],
-            frame.views[source],
+            views[target],
+            views[source],
             sights[source],
         )
-        origin = frame.views[source].camera.centre_mm
+        origin = views[source].camera.centre_mm
         ray = vertices_mm - origin
         ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-        slope = np.einsum("vij,vj->vi", frame.views[target].camera.pixel_jacobian(vertices_mm), ray)
+        slope = np.einsum("vij,vj->vi", views[target].camera.pixel_jacobian(vertices_mm), ray)
         square = np.maximum((slope * slope).sum(axis=1), 1e-9)
         along = (slope * motion.offset_px).sum(axis=1) / square
         across = motion.offset_px - along[:, None] * slope
@@ -71,7 +77,7 @@ def normal_offsets(
         offset = along * cosine
         weight = motion.weight * square / np.maximum(cosine**2, 0.04) / sigma_px**2
         weight *= np.exp(-0.5 * (off_line / (4 * sigma_px)) ** 2)
-        weight[np.abs(offset) > max_offset_mm] = 0
+        weight[np.abs(offset) > images.max_offset_mm] = 0
         offsets.append(offset)
         weights.append(weight)
     return robust_mean(np.array(offsets), np.array(weights))
@@ -91,26 +97,18 @@ def robust_mean(
 
 
 def polish(
-    frame: Frame,
+    images: PairedImages,
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
-    pairs: Sequence[tuple[str, str]],
-    matcher: FlowMatcher,
-    *,
     lengths_mm: Sequence[float],
-    sigma_px: float,
-    max_offset_mm: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the mesh onto the photo-consistent surface, one round a stiffness.
 
     Args:
-        frame: with its images.
+        images: that are compared.
         vertices_mm: (V, 3) world, mm.
         triangles: (T, 3).
-        pairs: of cameras.
-        matcher: of images.
         lengths_mm: stiffness of each round (see `solver`).
-        sigma_px, max_offset_mm: see `normal_offsets`.
 
     Returns:
         (vertices (V, 3) mm, information (V,) of the last round).
@@ -118,15 +116,7 @@ def polish(
     current = vertices_mm
     information = np.zeros(len(vertices_mm))
     for length in lengths_mm:
-        offset, information = normal_offsets(
-            frame,
-            current,
-            triangles,
-            pairs,
-            matcher,
-            sigma_px=sigma_px,
-            max_offset_mm=max_offset_mm,
-        )
+        offset, information = normal_offsets(images, current, triangles)
         plate = ThinPlate.of(current, triangles)
         normals = vertex_normals(current, triangles)
         weight = np.minimum(information / max(np.median(information[information > 0]), 1e-9), 10)

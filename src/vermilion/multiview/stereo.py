@@ -102,7 +102,7 @@ def _disparity(left, right, pair: Rectified, settings: StereoSettings):
         cv2.copyMakeBorder(np.ascontiguousarray(p), 0, 0, pad, pad, cv2.BORDER_CONSTANT)
         for p in (left, right)
     ]
-    matcher = cv2.StereoSGBM_create(
+    matcher = cv2.StereoSGBM.create(
         minDisparity=pair.min_disparity_px,
         numDisparities=pair.n_disparities,
         blockSize=block_px,
@@ -144,6 +144,5 @@ def _to_cloud(pair: Rectified, disparity, good) -> Cloud:
     depth = pair.left.to_camera(points[rows, columns])[:, 2]
     focal = pair.left.calibration[0, 0]
     sigma = 0.25 * depth**2 / (focal * pair.baseline_mm)
-    keep = np.isfinite(normals[rows, columns]).all(axis=1)
     cloud = Cloud(points[rows, columns], normals[rows, columns], sigma)
-    return cloud.select(keep)
+    return cloud.select(np.isfinite(cloud.normals).all(axis=1))

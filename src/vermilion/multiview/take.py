@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from pathlib import Path
 
 import numpy as np
 
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import Camera
+from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.geometry.mesh import Mesh, vertex_normals
-from vermilion.imaging.frames import FrameSource
+from vermilion.imaging.frames import FrameSource, open_frames
+from vermilion.imaging.source import Source
 from vermilion.multiview.cloud import near_mesh
 from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
 from vermilion.multiview.motion import CloudData, Reference, cloud_planes
@@ -60,6 +62,19 @@ class MultiviewImages:
     source: FrameSource
     cameras: Mapping[str, Camera]
     settings: ImageSettings
+
+    @classmethod
+    def open(
+        cls,
+        source: Source,
+        cameras: str | Path,
+        settings: Mapping[str, float],
+        subject: str = "",
+        take: str = "",
+    ) -> MultiviewImages:
+        """The images of a take's source, seen by a folder of cameras (COLMAP text)."""
+        frames = open_frames(source, subject, take)
+        return cls(frames, read_cameras(cameras), ImageSettings(**settings))
 
     def load(self, number: int, scale: float = 1.0) -> Frame:
         """All views of a frame; see `views.load_frame`."""

@@ -10,11 +10,10 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera
 from vermilion.imaging.frames import FrameSource
-from vermilion.imaging.images import linear_to_srgb
+from vermilion.imaging.images import LUMINANCE, linear_to_srgb
 from vermilion.imaging.undistortion import undistorted
 from vermilion.storage.errors import InputError
 
-LUMA = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 #: Grey levels of one local deviation in a normalised image.
 DEVIATION = 40
 
@@ -61,7 +60,7 @@ def make_view(
         floor: deviation (of luma in [0, 1]) that is added so that flat areas stay flat.
         scale: size of the view against the image; `window_px` is of the view.
     """
-    grey, camera = undistorted(linear_to_srgb(linear_rgb @ LUMA), camera)
+    grey, camera = undistorted(linear_to_srgb(linear_rgb @ LUMINANCE), camera)
     view = View(camera, grey, normalise(grey, window_px, floor) if scale == 1.0 else grey)
     return view if scale == 1.0 else _shrunk(view, scale, window_px, floor)
 

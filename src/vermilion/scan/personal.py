@@ -143,7 +143,9 @@ def _registered(
 
 def _distance_to(scan: Mesh, points_mm: np.ndarray) -> np.ndarray:
     """Distance (N,) mm of points (N, 3) to the surface of a scan in their frame."""
-    return Surface(scan.vertices_mm, scan.triangles).closest(points_mm).distance_mm
+    found = Surface(scan.vertices_mm, scan.triangles).closest(points_mm).distance_mm
+    assert found is not None  # a search gives it
+    return found
 
 
 def transferred(generic: FaceModel, fit: ScanFit, registered_mm: np.ndarray) -> FaceModel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,11 +27,9 @@ class ScanViews:
 
     mesh: Mesh
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_caster", RayCaster(self.mesh.vertices_mm, self.mesh.triangles))
-        object.__setattr__(
-            self, "_normals", vertex_normals(self.mesh.vertices_mm, self.mesh.triangles)
-        )
+    @cached_property
+    def _caster(self) -> RayCaster:
+        return RayCaster(self.mesh.vertices_mm, self.mesh.triangles)
 
     def image(self, camera: Camera) -> np.ndarray:
         """The bare surface in a lamp above the camera, (h, w, 3) linear in [0, 1].
@@ -40,7 +39,8 @@ class ScanViews:
         """
         origins, directions = camera.rays(camera.pixel_grid())
         hits = self._caster.cast(origins, directions)
-        normals = normalised(interpolate(hits, self.mesh.triangles, self._normals))
+        normals = vertex_normals(self.mesh.vertices_mm, self.mesh.triangles)
+        normals = normalised(interpolate(hits, self.mesh.triangles, normals))
         lamp = normalised(-directions + 0.5 * -camera.rotation[1])
         shade = 0.08 + 0.92 * np.abs((normals * lamp).sum(axis=-1))
         return np.where(hits.hit[..., None], shade[..., None] * _SKIN, _BACKGROUND)

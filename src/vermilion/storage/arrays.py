@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -12,10 +13,16 @@ from vermilion.storage.errors import InputError, PlacedError
 from vermilion.storage.files import atomic_path
 
 
-def write_arrays(path: str | Path, *, compressed: bool = False, **arrays) -> None:
+def write_arrays(path: str | Path, *, compressed: bool = False, **arrays: Any) -> None:
     """Write arrays by name; the same arrays give the same bytes."""
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         (np.savez_compressed if compressed else np.savez)(stream, **arrays)
+
+
+def write_array(path: str | Path, array: np.ndarray) -> None:
+    """Write one `array` (...,) of any shape as `.npy`, whole or not at all."""
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.save(stream, array)
 
 
 def read_arrays(
@@ -23,7 +30,7 @@ def read_arrays(
     what: str,
     names: Iterable[str] | None = None,
     error: type[PlacedError] = InputError,
-    **place,
+    **place: Any,
 ) -> dict[str, np.ndarray]:
     """Read the arrays of a file: those named, or all.
 

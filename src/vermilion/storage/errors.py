@@ -7,6 +7,7 @@ and what to do.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 
 class VermilionError(Exception):
@@ -44,7 +45,7 @@ def describe_problem(
 class PlacedError(VermilionError):
     """An error that names its place: what was found there, what was expected, what to do."""
 
-    def __init__(self, found: str, expected: str, hint: str, **place):
+    def __init__(self, found: str, expected: str, hint: str, **place: Any) -> None:
         self.brief = found
         super().__init__(describe_problem(found, expected, hint, **place))
 

@@ -1,8 +1,16 @@
-"""Which frames stand for all of them."""
+"""Which frames stand for all of them, and which can be read."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
+
 import numpy as np
+
+from vermilion.storage.errors import InputError
+
+Item = TypeVar("Item")
+Read = TypeVar("Read")
 
 
 def evenly_spaced(n: int, count: int) -> np.ndarray:
@@ -16,3 +24,13 @@ def evenly_spaced(n: int, count: int) -> np.ndarray:
         (min(n, count),) int64, ascending.
     """
     return np.linspace(0, n - 1, min(count, n)).round().astype(np.int64)
+
+
+def readable(items: Iterable[Item], read: Callable[[Item], Read]) -> Iterator[tuple[Item, Read]]:
+    """The items with what `read` gives; those for which it raises InputError are left out."""
+    for item in items:
+        try:
+            found = read(item)
+        except InputError:
+            continue
+        yield item, found

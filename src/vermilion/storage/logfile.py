@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from pathlib import Path
+from types import TracebackType
 
 from vermilion.storage.errors import VermilionError
 
@@ -26,7 +27,9 @@ def log_to(path: str | Path) -> None:
     stream = open(path, "w", buffering=1)  # noqa: SIM115 - open until the process ends
     sys.stdout = sys.stderr = stream
 
-    def report(kind, error, trace):
+    def report(
+        kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    ) -> None:
         traceback.print_exception(kind, error, trace, file=stream)
         what = str(error) if isinstance(error, VermilionError) else f"{kind.__name__}: {error}"
         print(f"\n{what}\nLog: {path}\n", file=terminal, flush=True)

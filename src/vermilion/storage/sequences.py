@@ -7,18 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.storage.arrays import write_array
 from vermilion.storage.errors import InputError
-from vermilion.storage.files import atomic_path
-
-#: Files of one mesh a frame.
 
 
 def write_sequence(path: str | Path, vertices_mm: np.ndarray) -> None:
     """Write `vertices_mm` (F, V, 3) as float32 `.npy`."""
     if vertices_mm.ndim != 3 or vertices_mm.shape[2] != 3:
         raise ValueError(f"a sequence must be (F, V, 3), got {vertices_mm.shape}")
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.save(stream, np.ascontiguousarray(vertices_mm, dtype=np.float32))
+    write_array(path, np.ascontiguousarray(vertices_mm, dtype=np.float32))
 
 
 def read_sequence(paths: str | Path | Sequence[str | Path]) -> np.ndarray:

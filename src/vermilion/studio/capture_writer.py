@@ -10,7 +10,8 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera
 from vermilion.imaging.images import write_image
-from vermilion.storage.files import atomic_path
+from vermilion.storage.arrays import write_array
+from vermilion.storage.files import write_text
 from vermilion.storage.progress import progress
 from vermilion.studio.labels import lip_contours, write_contours, write_landmarks
 from vermilion.studio.render import render
@@ -86,13 +87,7 @@ def write_truth(plan: StudioTakePlan, folder: str | Path) -> None:
     parts = (model.regions["teeth"] | model.regions["eyes"])[model.triangles].any(axis=1)
     names = plan.performance.names
     rows = [dict(zip(names, map(float, row), strict=True)) for row in plan.performance.weights]
-    _save(folder / "vertices_mm.npy", vertices)
-    _save(folder / "triangles.npy", model.triangles[~parts].astype(np.int64))
-    _save(folder / "neutral_mm.npy", plan.neutral_mm())
-    with atomic_path(folder / "weights.json") as temporary:
-        temporary.write_text(json.dumps(rows) + "\n", encoding="utf-8")
-
-
-def _save(path: Path, array: np.ndarray) -> None:
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
-        np.save(stream, array)
+    write_array(folder / "vertices_mm.npy", vertices)
+    write_array(folder / "triangles.npy", model.triangles[~parts].astype(np.int64))
+    write_array(folder / "neutral_mm.npy", plan.neutral_mm())
+    write_text(folder / "weights.json", json.dumps(rows) + "\n")

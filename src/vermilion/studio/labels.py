@@ -13,7 +13,7 @@ import numpy as np
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster, interpolate
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.studio.surface import SKIN, Surface
 
 #: Surface further past the meeting line than this is the inside of the mouth, not the lip (mm).
@@ -143,17 +143,13 @@ def write_contours(path: str | Path, image: str, loops: dict[str, np.ndarray]) -
     content: dict[str, Any] = {"unit": "px", "image": image}
     for name, points in loops.items():
         content[name] = {"closed": True, "points": np.round(points, 2).tolist()}
-    _write(path, content)
+    write_text(path, json.dumps(content) + "\n")
 
 
 def write_landmarks(path: str | Path, image: str, points_px: np.ndarray) -> None:
     """Write a landmark label: `points_px` (66, 2)."""
-    _write(path, {"unit": "px", "image": image, "points": np.round(points_px, 2).tolist()})
-
-
-def _write(path: str | Path, content: dict) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content) + "\n", encoding="utf-8")
+    content = {"unit": "px", "image": image, "points": np.round(points_px, 2).tolist()}
+    write_text(path, json.dumps(content) + "\n")
 
 
 def label_frames(first: int, last: int, count: int) -> list[int]:

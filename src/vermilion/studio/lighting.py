@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.studio import light_kernels
 
@@ -140,11 +139,6 @@ def sphere_points(count: int) -> np.ndarray:
     angle = np.pi * (3.0 - np.sqrt(5.0)) * index
     radius = np.sqrt(1.0 - z**2)
     return np.stack([radius * np.cos(angle), z, radius * np.sin(angle)], axis=1)
-
-
-def smooth_normals(vertices_mm: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Vertex normals (V, 3) float64 of `vertices_mm` (V, 3), `triangles` (T, 3)."""
-    return vertex_normals(np.asarray(vertices_mm, dtype=np.float64), triangles)
 
 
 def _buffers(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

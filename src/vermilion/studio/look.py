@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +61,7 @@ def look_of(seed: int, tattoo: bool) -> Look:
     )
 
 
+@cache
 def noise_volume(seed: int = 20160) -> np.ndarray:
     """Smooth noise that tiles, (64, 64, 64) float32, deviation 1, blobs some four cells wide."""
     white = np.random.default_rng(seed).standard_normal((NOISE_SIZE,) * 3)

@@ -37,22 +37,9 @@ MOUTH_POSES: tuple[dict[str, float], ...] = (
     {"mouthSmile_L": 0.8, "mouthUpperUp_L": 0.3},
     {"mouthSmile_R": 0.8, "mouthUpperUp_R": 0.3},
 )
-UPPER_FACE = (  # pairs; a shape without sides stands twice
-    "browInnerUp",
-    "browInnerUp",
-    "browInnerUp_L",
-    "browInnerUp_R",
-    "browDown_L",
-    "browDown_R",
-    "browOuterUp_L",
-    "browOuterUp_R",
-    "cheekSquint_L",
-    "cheekSquint_R",
-    "noseSneer_L",
-    "noseSneer_R",
-    "eyeSquint_L",
-    "eyeSquint_R",
-)
+_SIDED = ("browInnerUp", "browDown", "browOuterUp", "cheekSquint", "noseSneer", "eyeSquint")
+#: Pairs; a shape without sides stands twice.
+UPPER_FACE = ("browInnerUp", "browInnerUp", *(f"{name}_{side}" for name in _SIDED for side in "LR"))
 OPENING = "jawOpen"
 
 

@@ -8,9 +8,10 @@ from functools import lru_cache
 import numpy as np
 
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.studio import kernels
-from vermilion.studio.lighting import Lighting, bake_light, light_directions, smooth_normals
+from vermilion.studio.lighting import Lighting, bake_light, light_directions
 from vermilion.studio.look import Look, noise_volume
 from vermilion.studio.surface import Surface
 
@@ -21,7 +22,7 @@ class Scene:
 
     Attributes:
         triangles: (T, 3) int32 of the studio model.
-        n_directions, n_points: rays of the baking (sky directions, points a light).
+        occlusion_directions, light_samples: rays of the baking (of the sky, of each light).
         edge_samples: rays a pixel where an edge crosses it.
     """
 
@@ -29,8 +30,8 @@ class Scene:
     surface: Surface
     look: Look
     lighting: Lighting
-    n_directions: int = 192
-    n_points: int = 12
+    occlusion_directions: int = 192
+    light_samples: int = 12
     edge_samples: int = 4
 
 
@@ -54,7 +55,7 @@ def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
     """
     vertices = np.ascontiguousarray(vertices_mm, dtype=np.float64)
     caster = RayCaster(vertices, scene.triangles)
-    normals = smooth_normals(vertices, scene.triangles)
+    normals = vertex_normals(vertices, scene.triangles)
     views = {name: _look_through(scene, caster, normals, cam) for name, cam in cameras.items()}
     needed = np.zeros(len(vertices), dtype=bool)
     for view in views.values():
@@ -67,8 +68,8 @@ def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
         normals,
         np.flatnonzero(needed),
         scene.lighting,
-        scene.n_directions,
-        scene.n_points,
+        scene.occlusion_directions,
+        scene.light_samples,
     )
     return {name: _image(scene, view, normals, light) for name, view in views.items()}
 
@@ -119,7 +120,7 @@ def _shaded(scene: Scene, directions, hits: Hits, normals, light, pixel_angle) -
         light.visible,
         light_directions(scene.lighting),
         np.array([one.colour for one in scene.lighting.lights]),
-        _noise(),
+        noise_volume(),
         scene.look,
         surface.brows_mm,
         surface.chin_mm,
@@ -167,8 +168,3 @@ def _local_directions(model, params, width, height, offset) -> np.ndarray:
 
 def _world(local: np.ndarray, camera: Camera) -> np.ndarray:
     return local @ camera.rotation.astype(np.float32)
-
-
-@lru_cache(maxsize=1)
-def _noise() -> np.ndarray:
-    return noise_volume()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from vermilion.faces.model import FaceModel
@@ -10,12 +12,7 @@ from vermilion.geometry.camera import Camera, look_at, pinhole
 #: Turn about the vertical and height angle of each camera, degrees. Three stereo pairs on the face
 #: (left, front, right), two on the lips (from above, from below).
 FACE_ANGLES_DEG = {
-    "face0": (-32.0, 4.0),
-    "face1": (-22.0, 4.0),
-    "face2": (-5.0, 4.0),
-    "face3": (5.0, 4.0),
-    "face4": (22.0, 4.0),
-    "face5": (32.0, 4.0),
+    f"face{i}": (turn, 4.0) for i, turn in enumerate((-32.0, -22.0, -5.0, 5.0, 22.0, 32.0))
 }
 LIP_ANGLES_DEG = {
     "lip0": (-7.0, 15.0),
@@ -24,16 +21,28 @@ LIP_ANGLES_DEG = {
     "lip3": (7.0, -17.0),
 }
 MULTIVIEW_CAMERAS = (*FACE_ANGLES_DEG, *LIP_ANGLES_DEG)
-VIDEO_CAMERAS = ("cam",)
-STEREO_PAIRS = (
-    ("face0", "face1"),
-    ("face2", "face3"),
-    ("face4", "face5"),
-    ("lip0", "lip1"),
-    ("lip2", "lip3"),
-)
+VIDEO_CAMERAS, VIDEO_ANGLES_DEG = ("cam",), (0.0, 2.0)
 #: The pair that looks from in front; the first carries the contour labels.
 FRONTAL_PAIR = ("face2", "face3")
+
+
+@dataclass(frozen=True)
+class RigSettings:
+    """Where the cameras stand and what they see; the head frame of the actor's neutral is the world.
+
+    Attributes:
+        camera_distance_mm: from what a camera looks at.
+        face_size_px, lip_size_px, video_size_px: (width, height) of an image.
+        face_view_mm, lip_view_mm, video_view_mm: height that an image covers there.
+    """
+
+    camera_distance_mm: float
+    face_size_px: tuple[int, int]
+    lip_size_px: tuple[int, int]
+    video_size_px: tuple[int, int]
+    face_view_mm: float
+    lip_view_mm: float
+    video_view_mm: float
 
 
 def camera_names(role: str) -> tuple[str, ...]:
@@ -42,43 +51,28 @@ def camera_names(role: str) -> tuple[str, ...]:
 
 
 def lips16_rig(
-    model: FaceModel,
-    neutral_mm: np.ndarray,
-    distance_mm: float,
-    face_size_px: tuple[int, int],
-    lip_size_px: tuple[int, int],
-    face_view_mm: float,
-    lip_view_mm: float,
+    model: FaceModel, neutral_mm: np.ndarray, settings: RigSettings
 ) -> dict[str, Camera]:
-    """Ten cameras aimed at the actor whose neutral (V, 3) is given; its head frame is the world.
-
-    The views are heights that an image covers at the face and at the lips.
-    """
+    """Ten cameras aimed at the actor whose neutral `neutral_mm` (V, 3) is given, head frame."""
     lips = lips_centre(model, neutral_mm)
     face = face_centre(model, neutral_mm)
-    cameras = {}
+    distance, cameras = settings.camera_distance_mm, {}
     for angles, target, size, view in (
-        (FACE_ANGLES_DEG, face, face_size_px, face_view_mm),
-        (LIP_ANGLES_DEG, lips, lip_size_px, lip_view_mm),
+        (FACE_ANGLES_DEG, face, settings.face_size_px, settings.face_view_mm),
+        (LIP_ANGLES_DEG, lips, settings.lip_size_px, settings.lip_view_mm),
     ):
         for name, (turn, height) in angles.items():
-            cameras[name] = aimed_camera(name, target, turn, height, distance_mm, size, view)
+            cameras[name] = aimed_camera(name, target, turn, height, distance, size, view)
     return cameras
 
 
 def video_camera(
-    model: FaceModel,
-    neutral_mm: np.ndarray,
-    distance_mm: float,
-    size_px: tuple[int, int],
-    view_mm: float,
-    turn_deg: float = 0.0,
-    height_deg: float = 2.0,
+    model: FaceModel, neutral_mm: np.ndarray, settings: RigSettings
 ) -> dict[str, Camera]:
     """One camera in front of the face of a neutral `neutral_mm` (V, 3)."""
-    target = face_centre(model, neutral_mm)
-    camera = aimed_camera("cam", target, turn_deg, height_deg, distance_mm, size_px, view_mm)
-    return {"cam": camera}
+    target, distance = face_centre(model, neutral_mm), settings.camera_distance_mm
+    size, view = settings.video_size_px, settings.video_view_mm
+    return {"cam": aimed_camera("cam", target, *VIDEO_ANGLES_DEG, distance, size, view)}
 
 
 def aimed_camera(

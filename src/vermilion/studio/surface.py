@@ -57,7 +57,7 @@ def surface_of(model: FaceModel) -> Surface:
     upper = upper_side(graph, model.outer_contour, model.inner_contour, model.landmarks)
     brows = model.neutral_mm[model.landmarks[17:27], :2].reshape(2, 5, 2)
     return Surface(
-        solid_mm=_solid(model, label).astype(np.float32),
+        solid_mm=_solid(model).astype(np.float32),
         lip_mm=lip.astype(np.float32),
         inside_mm=inside.astype(np.float32),
         upper=upper,
@@ -115,7 +115,7 @@ def _distance_to_loop(points: np.ndarray, loop: np.ndarray, subdivision: int = 1
     return cKDTree(samples).query(points)[0]
 
 
-def _solid(model: FaceModel, label: np.ndarray) -> np.ndarray:
+def _solid(model: FaceModel) -> np.ndarray:
     """Neutral positions; those of each eyeball from the middle of its bounding box."""
     solid = model.neutral_mm.copy()
     eyes = model.regions["eyes"]

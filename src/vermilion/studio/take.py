@@ -141,29 +141,9 @@ def plan_people(model: FaceModel, n_frames: int, seed: int, spread: float) -> St
     )
 
 
-def cameras_of(
-    plan: StudioTakePlan,
-    role: str,
-    *,
-    camera_distance_mm: float,
-    face_size_px: tuple[int, int],
-    lip_size_px: tuple[int, int],
-    video_size_px: tuple[int, int],
-    face_view_mm: float,
-    lip_view_mm: float,
-    video_view_mm: float,
-) -> dict[str, Camera]:
+def cameras_of(plan: StudioTakePlan, role: str, settings: rig.RigSettings) -> dict[str, Camera]:
     """The rig of a multi-view take, or the camera of a video, aimed at the actor's neutral."""
     one_person = (plan.identities == plan.identities[0]).all()
     neutral = plan.neutral_mm() if one_person else plan.model.neutral_mm
-    if role in ("tattoo", "plain"):
-        return rig.lips16_rig(
-            plan.model,
-            neutral,
-            camera_distance_mm,
-            face_size_px,
-            lip_size_px,
-            face_view_mm,
-            lip_view_mm,
-        )
-    return rig.video_camera(plan.model, neutral, camera_distance_mm, video_size_px, video_view_mm)
+    aimed = rig.lips16_rig if role in ("tattoo", "plain") else rig.video_camera
+    return aimed(plan.model, neutral, settings)

@@ -9,10 +9,9 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
-from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 
 _SIDE_PX = 480
@@ -75,10 +74,7 @@ def tracking_overlay(
     rows = {int(frame): row for row, frame in enumerate(landmarks.frames)}
     for index in evenly_spaced(len(frames), count):
         frame = int(frames[index])
-        try:
-            image = to_display(source.read(camera.name, frame))
-        except InputError:
-            image = np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8)
+        image = shown_frame(source, camera.name, frame, (camera.width_px, camera.height_px))
         drawn = draw_tracked(image, camera, vertices_mm[index], model)
         if frame in rows:
             drawn = draw_points(drawn, landmarks.points_px[rows[frame]], (0, 255, 0), 1)

@@ -36,7 +36,7 @@ def wrong_pixels(opening, open_mouth, model) -> int:
     """Pixels whose middle is inked but counted open, or the other way."""
     camera, vertices, _ = open_mouth
     hit = RayCaster(vertices, model.triangles).see(camera).hit
-    found = opening.inside(camera.pixel_grid())
+    found = opening.inside_and_near(camera.pixel_grid())[0]
     middle = np.abs(camera.pixel_grid() - [120, 90]) < [30, 60]  # away from the corners
     return int((found == hit)[middle.all(axis=-1) & (found | ~hit)].sum())
 

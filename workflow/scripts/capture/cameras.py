@@ -20,11 +20,11 @@ from vermilion.capture.rig_poses import RigRefinementSettings
 from vermilion.capture.tracks import FeatureMatchSettings, find_features
 from vermilion.config.capture import CalibrationConfig, RigRefinementConfig
 from vermilion.geometry.camera import write_cameras
-from vermilion.imaging.frames import open_frames
+from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import read_image, write_srgb8
 from vermilion.imaging.source import folder_of
 from vermilion.storage.errors import InputError
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 
@@ -89,12 +89,8 @@ def overlay(rig, manifest, neutral, made):
             for name, moment in moments.items()
         }
         return calibration_sheet(rig.calibration, views)
-    source, images = open_frames(manifest.source, manifest.subject, manifest.take), {}
-    for name in rig.cameras:
-        try:
-            images[name] = source.read(name, neutral)
-        except InputError:
-            images[name] = None
+    source = open_frames(manifest.source, manifest.subject, manifest.take)
+    images = {name: read_or_none(source, name, neutral) for name in rig.cameras}
     if made is not None and made.shown and any(p is not None for p in images.values()):
         return refinement_sheet(images, made.shown, made.moved)
     return contact_sheet(images)
@@ -122,8 +118,7 @@ def main(snakemake):
         made = refinement(refine, rig, manifests[0], first, last)
         summary["refinement"] = {"mode": refine.mode, **made.summary()}
     write_srgb8(snakemake.output.overlay, overlay(rig, manifests[0], first, made))
-    with atomic_path(snakemake.output.summary) as temporary:
-        temporary.write_text(json.dumps(summary, indent=1, sort_keys=True) + "\n")
+    write_text(snakemake.output.summary, json.dumps(summary, indent=1, sort_keys=True) + "\n")
     write_cameras(snakemake.output.cameras, made.cameras if made else rig.cameras)
 
 

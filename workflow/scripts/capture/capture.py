@@ -3,23 +3,10 @@
 from vermilion.capture.manifest import capture_manifest, quality_rows
 from vermilion.capture.overlay import contact_sheet
 from vermilion.capture.video_facts import load_video_facts
-from vermilion.imaging.frames import open_frames
+from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import write_srgb8
-from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
-
-
-def first_images(manifest, frame):
-    """Camera -> linear image of a frame, None where it cannot be read."""
-    source = open_frames(manifest.source, manifest.subject, manifest.take)
-    images = {}
-    for camera in manifest.cameras:
-        try:
-            images[camera] = source.read(camera, frame)
-        except InputError:
-            images[camera] = None
-    return images
 
 
 def main(snakemake):
@@ -42,7 +29,9 @@ def main(snakemake):
     write_quality(
         snakemake.output.quality, subject, take, "capture", quality_rows(manifest, frames, [camera])
     )
-    write_srgb8(snakemake.output.overlay, contact_sheet(first_images(manifest, frames[0])))
+    source = open_frames(manifest.source, subject, take)
+    images = {name: read_or_none(source, name, frames[0]) for name in manifest.cameras}
+    write_srgb8(snakemake.output.overlay, contact_sheet(images))
     manifest.save(snakemake.output.manifest)
 
 

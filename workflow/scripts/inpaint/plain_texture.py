@@ -2,9 +2,7 @@
 
 from vermilion.config.inpaint import DomainConfig
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.raycast import RayCaster
-from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
@@ -20,10 +18,8 @@ def main(snakemake):
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.params.take}
     model = FaceModel.load(snakemake.input.template)
     domain = lip_domain(model, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
-    source = open_frames(snakemake.params.source, **place)
-    cameras = read_cameras(snakemake.input.cameras)
-    frontal = snakemake.params.cfg["capture.frontal_camera"]
-    views = read_views(source, cameras, frontal, snakemake.params.neutral, **place)
+    params, frontal = snakemake.params, snakemake.params.cfg["capture.frontal_camera"]
+    views = read_views(params.source, snakemake.input.cameras, frontal, params.neutral, **place)
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
     caster = RayCaster(neutral, model.triangles)
     texture = bake(domain, caster, neutral, views, cfg.edge_mm)

@@ -20,8 +20,7 @@ def main(snakemake):
     track = LandmarkTrack.load(list(snakemake.input.landmarks))
     given = {}
     for path in snakemake.input.csv:
-        settings = {k: v for k, v in cfg["csv"].items() if k != "path"}
-        found = read_landmark_csv(path, **settings).by_frame
+        found = read_landmark_csv(**{**cfg["csv"], "path": path}).by_frame
         given |= {frame: entry.points_px for frame, entry in found.items()}
     given |= labels_by_frame(snakemake.input.labels)  # a person is right where both speak
     track = without_offset(track, given)

@@ -35,8 +35,7 @@ def main(snakemake):
         if detector is not None:
             found[camera] = detector.detect(image).as_ibug66()
         elif path.is_file():
-            settings = {k: v for k, v in cfg["landmarks.csv"].items() if k != "path"}
-            found[camera] = read_landmark_csv(path, **settings).at(frame)
+            found[camera] = read_landmark_csv(**{**cfg["landmarks.csv"], "path": path}).at(frame)
         images.append(label(draw_landmarks(to_display(image), found[camera]), camera))
     write_srgb8(snakemake.output.overlay, tile(images, 5))
     LandmarkViews.of(found).save(snakemake.output.views)

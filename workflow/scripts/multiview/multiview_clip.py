@@ -3,27 +3,24 @@
 import cv2
 import numpy as np
 
-from vermilion.config.multiview import ImageConfig, TrackConfig
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
-from vermilion.imaging.frames import open_frames
 from vermilion.multiview.anchors import TrackSettings, clip_frames_of
 from vermilion.multiview.files import read_anchor, read_neutral, write_clip
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, MultiviewImages, open_coarse
+from vermilion.multiview.take import MultiviewImages, open_coarse
 from vermilion.multiview.track import Clip, track_clip
 from vermilion.storage.logfile import log_to
 
 
 def main(snakemake):
     cv2.setNumThreads(1)
-    cfg, params = snakemake.params.cfg, snakemake.params
-    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    track = TrackConfig(**cfg["multiview.track"]).model_dump(exclude={"clip_frames"})
+    cfg, params, inputs = snakemake.params.cfg, snakemake.params, snakemake.input
+    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
+    track = {k: v for k, v in cfg["multiview.track"].items() if k != "clip_frames"}
     scale = track.pop("scale")
-    model = FaceModel.load(snakemake.input.template)
-    neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
-    anchors = [read_anchor(path) for path in snakemake.input.anchors]
+    model = FaceModel.load(inputs.template)
+    neutral = read_neutral(inputs.neutral, model.n_vertices)
+    anchors = [read_anchor(path) for path in inputs.anchors]
     index, (first, last) = int(snakemake.wildcards.clip), params.frames
     frames, end = clip_frames_of(first, last, [anchor.frame for anchor in anchors], index)
     if not frames:
@@ -31,8 +28,7 @@ def main(snakemake):
         nothing = Clip(np.zeros(0, dtype=np.int64), np.zeros((0, *neutral.shape)), ())
         write_clip(snakemake.output.clip, nothing)
         return
-    source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
+    images = MultiviewImages.open(params.source, inputs.cameras, cfg["multiview.images"], *place)
     reference, load = open_coarse(images, first, neutral, model.triangles, scale)
     start = anchors[index - 1].vertices_mm if index else neutral
     numbers, stop = list(frames), None

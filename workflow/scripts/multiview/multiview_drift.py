@@ -2,14 +2,11 @@
 
 import cv2
 
-from vermilion.config.multiview import DriftConfig, ImageConfig
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
-from vermilion.imaging.frames import open_frames
 from vermilion.multiview.drift import DriftSettings, Origin, carry, drift_rows, unread_row
 from vermilion.multiview.files import read_neutral
 from vermilion.multiview.photometric import FlowMatcher
-from vermilion.multiview.take import ImageSettings, MultiviewImages
+from vermilion.multiview.take import MultiviewImages
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -19,16 +16,16 @@ from vermilion.storage.tables import write_table
 
 def main(snakemake):
     cv2.setNumThreads(1)
-    cfg, frames = snakemake.params.cfg, snakemake.params.frames
+    cfg, inputs, frames = snakemake.params.cfg, snakemake.input, snakemake.params.frames
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
-    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
-    model = FaceModel.load(snakemake.input.template)
-    source = open_frames(snakemake.params.source, **place)
-    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
-    neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
+    settings = DriftSettings(**cfg["multiview.drift"])
+    model = FaceModel.load(inputs.template)
+    images = MultiviewImages.open(
+        snakemake.params.source, inputs.cameras, cfg["multiview.images"], **place
+    )
+    neutral = read_neutral(inputs.neutral, model.n_vertices, **place)
     origin = Origin.of(images.load(snakemake.params.neutral, settings.scale), neutral, model)
-    meshes, matcher, rows = read_sequence(snakemake.input.meshes), FlowMatcher(), []
+    meshes, matcher, rows = read_sequence(inputs.meshes), FlowMatcher(), []
     for number, mesh in progress(zip(frames, meshes, strict=True), "drift", len(frames)):
         try:
             frame = images.load(number, settings.scale)

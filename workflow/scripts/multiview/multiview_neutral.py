@@ -3,12 +3,9 @@
 import cv2
 import numpy as np
 
-from vermilion.config.multiview import ImageConfig, NeutralConfig, RefineConfig, StereoConfig
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.mesh import unique_edges
 from vermilion.geometry.mesh_files import write_ply
-from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.cloud import write_cloud
 from vermilion.multiview.files import read_neutral, read_views, write_neutral
@@ -17,36 +14,38 @@ from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.register_to_first_take import register_to_first_take
 from vermilion.multiview.stereo import StereoSettings
-from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
+from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
 from vermilion.storage.logfile import log_to
 
 
-def refiner_of_first_take(snakemake, image_settings, stereo, model):
+def refiner_of_first_take(snakemake, stereo, model):
     """What registers images to the neutral of the person's first take."""
-    first = snakemake.params.first
-    source = open_frames(first["source"], snakemake.wildcards.subject, first["take"])
-    images = MultiviewImages(source, read_cameras(snakemake.input.first_cameras), image_settings)
-    neutral = read_neutral(snakemake.input.first_neutral, model.n_vertices)
-    settings = RefineSettings(**RefineConfig(**first["cfg"]["multiview.refine"]).model_dump())
+    first, inputs = snakemake.params.first, snakemake.input
+    options, place = snakemake.params.cfg["multiview.images"], snakemake.wildcards.subject
+    images = MultiviewImages.open(
+        first["source"], inputs.first_cameras, options, place, first["take"]
+    )
+    neutral = read_neutral(inputs.first_neutral, model.n_vertices)
+    settings = RefineSettings(**first["cfg"]["multiview.refine"])
     return Refiner(images, model, first["frame"], neutral, stereo, settings, FlowMatcher())
 
 
 def main(snakemake):
     cv2.setNumThreads(1)
-    cfg = snakemake.params.cfg
-    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
-    neutral = NeutralConfig(**cfg["multiview.neutral"]).model_dump(exclude={"same_points"})
+    cfg, inputs = snakemake.params.cfg, snakemake.input
+    stereo = StereoSettings(**cfg["multiview.stereo"])
+    neutral = {k: v for k, v in cfg["multiview.neutral"].items() if k != "same_points"}
     limits = {name: neutral.pop(name) for name in ("min_confidence", "landmark_distance_mm")}
-    model = FaceModel.load(snakemake.input.template)
-    cameras = read_cameras(snakemake.input.cameras)
+    model = FaceModel.load(inputs.template)
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
-    source = open_frames(snakemake.params.source, subject, take)
-    frame = MultiviewImages(source, cameras, image_settings).load(snakemake.params.frame)
-    names, points, confidence = read_views(snakemake.input.landmarks, frame.views)
+    images = MultiviewImages.open(
+        snakemake.params.source, inputs.cameras, cfg["multiview.images"], subject, take
+    )
+    frame = images.load(snakemake.params.frame)
+    names, points, confidence = read_views(inputs.landmarks, frame.views)
     landmarks = triangulate_landmarks(
-        cameras,
+        images.cameras,
         names,
         points,
         confidence,
@@ -58,7 +57,7 @@ def main(snakemake):
     )
     print(f"{int(landmarks.valid.sum())} landmarks, {len(found.cloud)} points")
     if snakemake.params.first:
-        first = refiner_of_first_take(snakemake, image_settings, stereo, model)
+        first = refiner_of_first_take(snakemake, stereo, model)
         name = snakemake.params.first["take"]
         found, why = register_to_first_take(first, name, frame, found)
         if why:

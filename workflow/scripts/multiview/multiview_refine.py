@@ -3,18 +3,15 @@
 import cv2
 import numpy as np
 
-from vermilion.config.multiview import ImageConfig, RefineConfig, StereoConfig
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.mesh import unique_edges
-from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.files import read_neutral, read_track
 from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
-from vermilion.multiview.take import ImageSettings, MultiviewImages, Refiner, RefineSettings
-from vermilion.storage.files import atomic_path
+from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
+from vermilion.storage.arrays import write_array
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -24,16 +21,16 @@ from vermilion.storage.sequences import write_sequence
 
 def main(snakemake):
     cv2.setNumThreads(1)
-    cfg, frames = snakemake.params.cfg, snakemake.params.frames
+    cfg, inputs, frames = snakemake.params.cfg, snakemake.input, snakemake.params.frames
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
-    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    stereo = StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump())
-    settings = RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump())
-    model = FaceModel.load(snakemake.input.template)
-    source = open_frames(snakemake.params.source, subject, take)
-    images = MultiviewImages(source, read_cameras(snakemake.input.cameras), image_settings)
-    neutral = read_neutral(snakemake.input.neutral, model.n_vertices)
-    coarse = read_track(snakemake.input.track, frames)
+    stereo = StereoSettings(**cfg["multiview.stereo"])
+    settings = RefineSettings(**cfg["multiview.refine"])
+    model = FaceModel.load(inputs.template)
+    images = MultiviewImages.open(
+        snakemake.params.source, inputs.cameras, cfg["multiview.images"], subject, take
+    )
+    neutral = read_neutral(inputs.neutral, model.n_vertices)
+    coarse = read_track(inputs.track, frames)
     refiner = Refiner(
         images, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
     )
@@ -47,8 +44,7 @@ def main(snakemake):
         if number in drawn and found.quality.valid:
             shown.append((images.load(number), found))
     write_sequence(snakemake.output.meshes, np.array(meshes))
-    with atomic_path(snakemake.output.visibility) as path, open(path, "wb") as stream:
-        np.save(stream, np.array(seeing))
+    write_array(snakemake.output.visibility, np.array(seeing))
     write_quality(snakemake.output.quality, subject, take, "multiview", rows)
     write_srgb8(
         snakemake.output.overlay,

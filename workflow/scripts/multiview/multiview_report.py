@@ -4,25 +4,16 @@ import cv2
 import numpy as np
 import pandas as pd
 
-from vermilion.config.multiview import (
-    DriftConfig,
-    ImageConfig,
-    RefineConfig,
-    ReportConfig,
-    StereoConfig,
-)
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.camera import read_cameras
-from vermilion.imaging.frames import open_frames
 from vermilion.multiview.drift import DriftSettings
 from vermilion.multiview.files import read_anchors, read_neutral
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
-from vermilion.multiview.take import ImageSettings, MultiviewImages, RefineSettings
+from vermilion.multiview.take import MultiviewImages, RefineSettings
 from vermilion.report.multiview_page import TakeFindings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
-from vermilion.storage.files import atomic_path
+from vermilion.storage.files import write_text
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence, rows_of_frames
@@ -43,22 +34,22 @@ def main(snakemake):
     cv2.setNumThreads(1)
     cfg, inputs = snakemake.params.cfg, snakemake.input
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
-    report = ReportConfig(**cfg["multiview.report"])
-    drift_settings = DriftSettings(**DriftConfig(**cfg["multiview.drift"]).model_dump())
+    report, drift_settings = cfg["multiview.report"], DriftSettings(**cfg["multiview.drift"])
     model = FaceModel.load(inputs.template)
-    image_settings = ImageSettings(**ImageConfig(**cfg["multiview.images"]).model_dump())
-    images = MultiviewImages(
-        open_frames(snakemake.params.source, **place), read_cameras(inputs.cameras), image_settings
+    images = MultiviewImages.open(
+        snakemake.params.source, inputs.cameras, cfg["multiview.images"], **place
     )
     sheets = TakeSheets(
         images,
         model,
         snakemake.params.neutral,
         read_neutral(inputs.neutral, model.n_vertices, **place),
-        StereoSettings(**StereoConfig(**cfg["multiview.stereo"]).model_dump()),
-        RefineSettings(**RefineConfig(**cfg["multiview.refine"]).model_dump()),
+        StereoSettings(**cfg["multiview.stereo"]),
+        RefineSettings(**cfg["multiview.refine"]),
         drift_settings,
-        SheetSettings(report.image_px, report.residual_px, report.cloud_mm, drift_settings.scale),
+        SheetSettings(
+            report["image_px"], report["residual_px"], report["cloud_mm"], drift_settings.scale
+        ),
         FlowMatcher(),
     )
     drift, frames = joined(inputs.drift), pd.DataFrame()
@@ -66,7 +57,7 @@ def main(snakemake):
         _, similarity, anchors = read_anchors(inputs.track[0])
         frames = join_frames(joined(inputs.quality), drift, similarity, anchors)
     why = choose_frames(
-        frames, snakemake.params.neutral, report.spaced_frames, report.flagged_frames
+        frames, snakemake.params.neutral, report["spaced_frames"], report["flagged_frames"]
     )
     meshes = rows_at(inputs.meshes, why, read_sequence)
     seeing = rows_at(inputs.visibility, why, lambda path: np.load(path, mmap_mode="r"))
@@ -84,8 +75,7 @@ def main(snakemake):
     )
     columns = ["subject", "take", *found.across.columns]
     write_table(snakemake.output.drift, drift if len(drift) else pd.DataFrame(columns=columns))
-    with atomic_path(snakemake.output.page) as temporary:
-        temporary.write_text(report_page(found, shown, report.page_mb), encoding="utf-8")
+    write_text(snakemake.output.page, report_page(found, shown, report["page_mb"]))
 
 
 if __name__ == "__main__":

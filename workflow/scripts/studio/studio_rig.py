@@ -6,6 +6,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import write_cameras
 from vermilion.storage.logfile import log_to
 from vermilion.studio.capture_writer import write_labels, write_truth
+from vermilion.studio.rig import RigSettings
 from vermilion.studio.take import cameras_of, plan_take
 from vermilion.studio.take_settings import take_settings
 
@@ -13,7 +14,7 @@ if __name__ == "__main__":
     log_to(snakemake.log[0])
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
-    cameras = cameras_of(plan, cfg["plan"]["role"], **cfg["cameras"])
+    cameras = cameras_of(plan, cfg["plan"]["role"], RigSettings(**cfg["cameras"]))
     folder = Path(snakemake.output.cameras[0]).parent
     write_cameras(folder, cameras)
     write_labels(

@@ -14,7 +14,6 @@ if __name__ == "__main__":
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     folder = Path(snakemake.input.cameras[0]).parent
-    images = cfg["images"]
     write_images(
         plan,
         read_cameras(folder),
@@ -23,9 +22,5 @@ if __name__ == "__main__":
         cfg["plan"]["first"],
         name=cfg["name"],
         seed=cfg["plan"]["seed"],
-        noise_read=images["noise_read"],
-        noise_shot=images["noise_shot"],
-        n_directions=images["occlusion_directions"],
-        n_points=images["light_samples"],
-        edge_samples=images["edge_samples"],
+        **cfg["images"],
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vermilion.landmarks.appearance import (
+from vermilion.landmarks.binary_patterns import (
     N_BINS,
     N_UNIFORM,
     affine_between,

@@ -1,4 +1,4 @@
-"""Appearance of a face by local binary patterns, to compare frames (Mono13 5.2, eq. 3)."""
+"""Local binary patterns of a face, to compare frames (Mono13 5.2, eq. 3)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DIAGONAL, _ONE = 181, 256
 
 
 @dataclass(frozen=True)
-class AppearanceSettings:
+class PatternSettings:
     """Sizes in inter-ocular distances (of the outer eye corners) but for `face_px` and `blur_px`.
 
     Attributes:
@@ -54,8 +54,8 @@ class ReferenceShape:
     patches: np.ndarray
 
     @classmethod
-    def of(cls, points_px: np.ndarray, settings: AppearanceSettings) -> ReferenceShape:
-        """From the landmarks (66, 2) of the reference frame."""
+    def of(cls, points_px: np.ndarray, settings: PatternSettings) -> ReferenceShape:
+        """From the landmarks `points_px` (66, 2) of the reference frame."""
         unit = settings.face_px
         margin = unit * (max(*settings.eye, *settings.mouth) / 2 + settings.patch)
         points = points_px * (unit / interocular_px(points_px))
@@ -77,39 +77,45 @@ class ReferenceShape:
 
 
 @dataclass(frozen=True)
-class Appearance:
-    """Histograms of one frame: `regions`, each (tiles, 75), and `patches` (66, 75)."""
+class FacePatterns:
+    """Histograms of patterns of one frame: `regions`, each (tiles, 75), `patches` (66, 75)."""
 
     regions: tuple[np.ndarray, ...]
     patches: np.ndarray
 
-    def region_distance(self, other: Appearance) -> float:
+    def region_distance(self, other: FacePatterns) -> float:
         """Mono13 eq. 3: the sum over eyes and mouth."""
         pairs = zip(self.regions, other.regions, strict=True)
         return float(sum(chi_squared(a, b) for a, b in pairs))
 
-    def patch_distance(self, other: Appearance) -> float:
+    def patch_distance(self, other: FacePatterns) -> float:
         """The same over the patches round the landmarks."""
         return chi_squared(self.patches, other.patches)
 
 
 def describe(
-    grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape, settings: AppearanceSettings
-) -> Appearance:
-    """Histograms of an image (h, w) in [0, 1] with landmarks (66, 2), aligned to the reference."""
+    grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape, settings: PatternSettings
+) -> FacePatterns:
+    """Histograms of a frame that is aligned to the reference.
+
+    Args:
+        grey: (h, w) display brightness in [0, 1].
+        points_px: (66, 2) landmarks of the frame.
+    """
     aligned = align(grey, points_px, reference)
     aligned = cv2.GaussianBlur(aligned, (0, 0), settings.blur_px)
     pixels = np.clip(np.rint(aligned * 255), 0, 255).astype(np.uint8)
     uniform, plain = uniform_code(lbp8(pixels)), lbp4(pixels)
     regions = tuple(histograms(uniform, plain, tiles) for tiles in reference.regions)
-    return Appearance(regions, histograms(uniform, plain, reference.patches))
+    return FacePatterns(regions, histograms(uniform, plain, reference.patches))
 
 
 def align(grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape) -> np.ndarray:
-    """The image (h, w) float32 under the affine map of its landmarks to the reference's."""
+    """`grey` (h, w) as float32 under the affine map of `points_px` (66, 2) to the reference's."""
     to_image = affine_between(reference.points, points_px)
     scale = np.sqrt(abs(np.linalg.det(to_image[:, :2])))
-    image, shrink = grey.astype(np.float32), 1.0
+    image: np.ndarray = grey.astype(np.float32)
+    shrink = 1.0
     while scale * shrink > 1.5 and min(image.shape) > 32:
         image, shrink = cv2.pyrDown(image), shrink * 0.5
     matrix = to_image * shrink
@@ -122,14 +128,17 @@ def align(grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape) ->
 
 
 def affine_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """The affine map (2, 3) that brings points (N, 2) nearest to points (N, 2), least squares."""
+    """The affine map (2, 3) that brings `source` (N, 2) nearest to `target` (N, 2), least squares."""
     homogeneous = np.concatenate([source, np.ones((len(source), 1))], axis=1)
     return np.linalg.lstsq(homogeneous, target, rcond=None)[0].T
 
 
 def lbp8(pixels: np.ndarray) -> np.ndarray:
-    """Codes (h, w) uint8 of (h, w) uint8: bit k says that the neighbour at k * 45 degrees is not
-    darker. Radius one pixel; the diagonal ones are interpolated."""
+    """Codes (h, w) uint8 of `pixels` (h, w) uint8.
+
+    Bit k says that the neighbour at k * 45 degrees is not darker. Radius one pixel; the diagonal ones
+    are interpolated.
+    """
     centre, around = _neighbours(pixels)
     a, b = _DIAGONAL, _ONE - _DIAGONAL
     code = np.zeros(pixels.shape, dtype=np.uint8)
@@ -145,7 +154,7 @@ def lbp8(pixels: np.ndarray) -> np.ndarray:
 
 
 def lbp4(pixels: np.ndarray) -> np.ndarray:
-    """Codes (h, w) uint8 below 16 of (h, w) uint8: right, up, left and down neighbours."""
+    """Codes (h, w) uint8 below 16 of `pixels` (h, w) uint8: right, up, left and down neighbours."""
     centre, around = _neighbours(pixels)
     code = np.zeros(pixels.shape, dtype=np.uint8)
     for k in range(4):
@@ -154,13 +163,24 @@ def lbp4(pixels: np.ndarray) -> np.ndarray:
 
 
 def uniform_code(codes: np.ndarray) -> np.ndarray:
-    """The bin, below 59, of each 8-bit code: one for each of the 58 patterns with at most two
-    changes round the circle, and the last for all others."""
+    """The bin (h, w), below 59, of 8-bit `codes` (h, w).
+
+    One for each of the 58 patterns with at most two changes round the circle, the last for all others.
+    """
     return _UNIFORM[codes]
 
 
 def histograms(uniform: np.ndarray, plain: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Shares (N, 75) of the codes (h, w) in N boxes; 59 and 16 bins, each part sums to one."""
+    """Shares of codes in boxes.
+
+    Args:
+        uniform: (h, w) codes below 59.
+        plain: (h, w) codes below 16.
+        boxes: (N, 4) x, y, width, height in px.
+
+    Returns:
+        (N, 75): 59 and 16 bins, each part sums to one.
+    """
     result = np.empty((len(boxes), N_BINS))
     for row, (x, y, width, height) in enumerate(boxes):
         place = np.s_[y : y + height, x : x + width]
@@ -171,7 +191,7 @@ def histograms(uniform: np.ndarray, plain: np.ndarray, boxes: np.ndarray) -> np.
 
 
 def chi_squared(a: np.ndarray, b: np.ndarray) -> float:
-    """Chi-squared distance, sum of (a - b)^2 / (a + b), of histograms of any shape."""
+    """Chi-squared distance, sum of (a - b)^2 / (a + b), of histograms `a` (..., B) and `b` (..., B)."""
     total = a + b
     return float(np.sum((a - b) ** 2 / np.where(total > 0, total, 1.0)))
 
