@@ -32,7 +32,7 @@ CLASSES = {
         ("contours.detector.boosting", "contours.detector"),
         {"n_trees": "contours.detector.boosting.trees"},
     ),
-    "contours.detector.BoostedDetector": Pair(("contours.detector",)),
+    "contours.boosted.BoostedDetector": Pair(("contours.detector",)),
     "contours.ridges.RidgeDetector": Pair(
         ("contours.detector",),
         {
@@ -50,7 +50,6 @@ CLASSES = {
     "contours.training.TrainingSettings": Pair(
         ("contours.detector",), {"n_features": "contours.detector.features"}
     ),
-    "correction.image_contours.ImageContourSettings": Pair(("correction.image",)),
     "detail.flow.deformation.DeformationSettings": Pair(("detail.deformation",)),
     "detail.flow.six_frame_flow.FlowSettings": Pair(("detail.flow",)),
     "detail.relief.relief.ReliefSettings": Pair(("detail.relief",)),
@@ -60,9 +59,9 @@ CLASSES = {
         {"outward": "features.contours.reach", "inward": "features.contours.reach"},
         {"floor": "keeps the logarithm of a likelihood finite"},
     ),
-    "inpaint.opening.Evidence": Pair(("inpaint.opening",)),
-    "inpaint.paint.Paint": Pair(("inpaint.composite", "inpaint.domain", "inpaint.shading")),
-    "inpaint.shading.Shading": Pair(("inpaint.shading",)),
+    "inpaint.opening.OpeningSettings": Pair(("inpaint.opening",)),
+    "inpaint.frame.InpaintInputs": Pair(("inpaint.composite", "inpaint.domain", "inpaint.shading")),
+    "inpaint.shading.ShadingSettings": Pair(("inpaint.shading",)),
     "landmarks.correction.CorrectionSettings": Pair(
         ("landmarks.correction",),
         unset={"fill_confidence": "confidence of a landmark that no frame detected"},
@@ -70,8 +69,9 @@ CLASSES = {
     "landmarks.key_frames.KeyFrameSettings": Pair(("landmarks.key_frames",)),
     "landmarks.networks.NetworkSettings": Pair(("landmarks.networks",)),
     "landmarks.training.TrainingSettings": Pair(("landmarks.training",)),
+    "multiview.refine.FrameMatchSettings": Pair(("multiview.refine",)),
     "regression.training.Selection": Pair(("training",)),
-    "studio.render.Stage": Pair(
+    "studio.render.Scene": Pair(
         ("studio",),
         {"n_directions": "studio.occlusion_directions", "n_points": "studio.light_samples"},
     ),
@@ -94,9 +94,13 @@ CLASSES = {
 
 #: Classes with a number as a default that no configuration sets.
 WITHOUT_SECTION = {
-    "evaluation.corrected.CoarseTake": "0 switches the integration's steps off",
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
+    "geometry.registration.Schedule": "by default the search distance stays; scans shrink it",
+    "guided.refinement.RefinementSettings": "Guided18's weights; a sketch has no configuration",
+    "imaging.colour.VideoColour": "what a video without tags has: sRGB primaries",
+    "imaging.presentation.Presentation": "what a video without tags has: square pixels, no HDR",
     "landmarks.appearance.AppearanceSettings": "Mono13's constants for likeness of frames",
+    "multiview.motion.SolveSettings": "rounds and tolerance of an iterative solve that converges",
     "multiview.neutral.Neutral": "a result: the first take's neutral has not moved",
 }
 
@@ -106,23 +110,9 @@ FUNCTIONS = {
     "capture.manifest.capture_manifest": {"hash_decoded": "capture.manifest.hash_decoded"},
     "capture.patches.align_patches": {"radius_px": "capture.refinement.patch_radius_px"},
     "contours.training.train_detector": {"seed": "contours.detector.seed"},
-    "correction.correct.Corrector": {"seam_mm": "correction.integration.seam_mm"},
     "correction.domain.integration_domain": {"seam_mm": "correction.integration.seam_mm"},
-    "correction.correct.correct_sequence": {"seam_mm": "correction.integration.seam_mm"},
-    "correction.correct.correct_with_layers": {"seam_mm": "correction.integration.seam_mm"},
     "correction.integration.LayerIntegrator": {"seam_mm": "correction.integration.seam_mm"},
     "correction.take_layers.take_layers": {"head": "correction.layers.head"},
-    "correspondence.correspondence.find_correspondence": {
-        "mask_radius_mm": "correspondence.mask_radius_mm",
-        "eye_gap_mm": "correspondence.eye_gap_mm",
-        "max_distance_mm": "correspondence.max_distance_mm",
-        "max_angle_deg": "correspondence.max_angle_deg",
-    },
-    "correspondence.neutral.correspond_neutrals": {
-        "landmarks": "correspondence.landmarks",
-        "search_distance_mm": "correspondence.search_distance_mm",
-        "max_distance_mm": "correspondence.max_distance_mm",
-    },
     "database.write.write_database": {
         "min_common_mask": "database.min_common_mask",
         "compression": "database.compression",
@@ -144,15 +134,7 @@ FUNCTIONS = {
         "n_triangles": "face_model.tracker_triangles",
     },
     "features.tracked_lips.TrackedLips.of": {"n_samples": "features.contours.samples"},
-    "geometry.registration.register": {
-        "landmark_weight": "correspondence.landmark_weight",
-        "wavelengths_mm": "correspondence.wavelengths_mm",
-        "search_distance_mm": "correspondence.search_distance_mm",
-        "max_angle_deg": "correspondence.max_angle_deg",
-    },
-    "geometry.surface_points.closest_on_surface": {"max_angle_deg": "correspondence.max_angle_deg"},
     "inpaint.bake.bake": {"edge_mm": "inpaint.domain.edge_mm"},
-    "inpaint.composite.render_layer": {"samples": "inpaint.composite.samples"},
     "inpaint.tattoo.tattoo_mask": {"closing_mm": "inpaint.mask.closing_mm"},
     "landmarks.flow.FaceFlow": {"face_px": "landmarks.correction.face_px"},
     "landmarks.table.read_landmark_csv": {
@@ -162,10 +144,6 @@ FUNCTIONS = {
     },
     "multiview.photometric.motion_at": {"min_agreement": "multiview.track.min_agreement"},
     "multiview.photometric.measure_motion": {"min_agreement": "multiview.track.min_agreement"},
-    "multiview.refine.register_frame": {
-        "stride_px": "multiview.refine.ray_stride_px",
-        "cloud_gate_mm": "multiview.refine.cloud_gate_mm",
-    },
     "regression.cross_validation.cross_validate": {"n_folds": "training.folds"},
     "regression.kernel.KernelRegressor": {
         "linear": "training.kernel_linear",
@@ -173,7 +151,7 @@ FUNCTIONS = {
         "equalise": "training.kernel_equalise",
     },
     "scan.personal.personal_model": {"finest_mm": "scan:finest_mm"},
-    "studio.lighting.bake": {
+    "studio.lighting.bake_light": {
         "n_directions": "studio.occlusion_directions",
         "n_points": "studio.light_samples",
     },
@@ -185,18 +163,5 @@ FUNCTIONS = {
         "intensity": "studio.intensity",
         "n_poses": "studio_take:poses",
         "pose_seconds": "studio_take:pose_seconds",
-    },
-    "studio.take.plan_take": {
-        "performance": "studio_take:performance",
-        "poses": "studio_take:poses",
-        "pose_seconds": "studio_take:pose_seconds",
-        "csv_first": "studio_take:csv_first",
-        "csv_fps": "studio_take:csv_fps",
-        "lights": "studio_take:lights",
-        "slight_open": "studio.slight_open",
-        "ease_in_frames": "studio.ease_in_frames",
-        "intensity": "studio.intensity",
-        "head_turn_deg": "studio.head_turn_deg",
-        "head_shift_mm": "studio.head_shift_mm",
     },
 }  # fmt: skip
