@@ -34,7 +34,7 @@ SIZES = {
     "lip_view_mm": 105.0,
     "video_view_mm": 250.0,
 }
-RAYS = {"n_directions": 64, "n_points": 4}
+RAYS = {"n_directions": 32, "n_points": 2}
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
 from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.lips import lip_sides
-from vermilion.faces.lips import lip_sides
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.mesh import vertex_areas
 
