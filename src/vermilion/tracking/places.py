@@ -21,6 +21,7 @@ from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.surface_points import SurfacePoints
+from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
 from vermilion.scan.views import ScanViews, camera_towards
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -60,7 +61,7 @@ class LandmarkPlaces:
         )
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As arrays, from which `from_arrays` makes the same."""
+        """As arrays, from which `from_arrays` makes the same: triangle (N,), barycentric (N, 3)."""
         return {
             "landmark_set": np.array(self.landmark_set.name),
             "triangle": self.points.triangle,
@@ -70,13 +71,13 @@ class LandmarkPlaces:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> LandmarkPlaces:
-        """Of what `arrays` gave."""
+        """Of what `arrays` gave: triangle (N,), barycentric (N, 3)."""
         points = SurfacePoints(arrays["triangle"], arrays["barycentric"])
         return cls(set_of(str(arrays["landmark_set"])), points, arrays["triangles"])
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(path, **self.arrays())
+        write_arrays(path, compressed=False, **self.arrays())
 
     @classmethod
     def load(cls, path: str | Path) -> LandmarkPlaces:
@@ -90,8 +91,8 @@ class ShapeDetector(Protocol):
 
     landmark_set: LandmarkSet
 
-    def detect(self, linear_rgb: np.ndarray):
-        """`Landmarks` with `depth_px`."""
+    def detect(self, linear_rgb: np.ndarray) -> Landmarks:
+        """Landmarks with `depth_px` of an image `linear_rgb` (h, w, 3)."""
 
 
 def detected_shape(model: FaceModel, detector: ShapeDetector) -> np.ndarray:
@@ -156,6 +157,7 @@ def _closest_skin(model: FaceModel, points: np.ndarray) -> tuple[SurfacePoints, 
     hidden = np.any([model.regions[name] for name in _HIDDEN], axis=0)
     skin = np.flatnonzero(~hidden[model.triangles].any(axis=1))
     found = Surface(model.neutral_mm, model.triangles[skin]).closest(points)
+    assert found.distance_mm is not None  # a search gives it
     return SurfacePoints(skin[found.triangle], found.barycentric), found.distance_mm
 
 
