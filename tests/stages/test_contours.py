@@ -17,6 +17,8 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.sequences import write_sequence
 from vermilion.storage.tables import read_table
 
+pytestmark = pytest.mark.slow
+
 SHAPES = [(2.0, 20.0), (12.0, 28.0), (7.0, 24.0), (9.0, 26.0), (5.0, 22.0)]  # opening, height
 LABELLED = (0, 1, 2)
 UNREADABLE = 4

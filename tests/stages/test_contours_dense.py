@@ -13,6 +13,8 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.sets import MEDIAPIPE478
 from vermilion.storage.tables import read_table
 
+pytestmark = pytest.mark.slow
+
 OPENINGS = (6.0, 12.0, 9.0, 7.0)
 CENTRE, HEIGHT, WIDTH = np.array([120.0, 150.0]), 26.0, 52.0
 NAME = {"subject": "s1", "take": "phone"}

@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import pytest
 
 from tests.stages.run_script import run_script
 from vermilion.config.detail import DetailConfig
@@ -13,6 +14,8 @@ from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.result import TrackedTake
+
+pytestmark = pytest.mark.slow
 
 N_FRAMES = 4
 CAMERA = pinhole(

@@ -77,6 +77,7 @@ def run_stage(root, paths):
     return read_sequence([out / path.name for path in paths])
 
 
+@pytest.mark.slow
 def test_wrinkle_is_found_whatever_the_chunks(tmp_path):
     paths = prepare(tmp_path / "one", [N_FRAMES])
     whole = run_stage(tmp_path / "one", paths)

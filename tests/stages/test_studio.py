@@ -27,7 +27,7 @@ from vermilion.studio.take import cameras_of, plan_take
 from vermilion.studio.take_settings import take_settings
 
 SIZES = RigSettings(735.0, (200, 200), (240, 200), (240, 200), 245.0, 105.0, 250.0)
-RAYS = {"occlusion_directions": 64, "light_samples": 4}
+RAYS = {"occlusion_directions": 32, "light_samples": 2}
 
 
 @pytest.fixture(scope="module")

@@ -92,10 +92,12 @@ CLASSES = {
 #: Classes with a number as a default that no configuration sets.
 WITHOUT_SECTION = {
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
-    "imaging.colour.VideoColour": "tags of a file: sRGB where there are none",
-    "imaging.presentation.Presentation": "tags of a file: upright and square where there are none",
+    "geometry.registration.Schedule": "by default the search distance stays; scans shrink it",
+    "guided.refinement.RefinementSettings": "Guided18's weights; a sketch has no configuration",
+    "imaging.colour.VideoColour": "what a video without tags has: sRGB primaries",
+    "imaging.presentation.Presentation": "what a video without tags has: square pixels, no HDR",
     "landmarks.binary_patterns.PatternSettings": "Mono13's constants for likeness of frames",
-    "multiview.motion.SolveSettings": "bounds of the solver, which the coarse track lowers",
+    "multiview.motion.SolveSettings": "rounds and tolerance of an iterative solve that converges",
     "multiview.neutral.Neutral": "a result: the first take's neutral has not moved",
 }
 
@@ -128,13 +130,6 @@ FUNCTIONS = {
         "n_triangles": "face_model.tracker_triangles",
     },
     "features.tracked_lips.TrackedLips.of": {"n_samples": "features.contours.samples"},
-    "geometry.registration.register": {
-        "landmark_weight": "correspondence.landmark_weight",
-        "wavelengths_mm": "correspondence.wavelengths_mm",
-        "search_distance_mm": "correspondence.search_distance_mm",
-        "max_angle_deg": "correspondence.max_angle_deg",
-    },
-    "geometry.surface_points.closest_on_surface": {"max_angle_deg": "correspondence.max_angle_deg"},
     "inpaint.bake.bake": {"edge_mm": "inpaint.domain.edge_mm"},
     "inpaint.tattoo.tattoo_mask": {"closing_mm": "inpaint.mask.closing_mm"},
     "landmarks.flow.FaceFlow": {"face_px": "landmarks.correction.face_px"},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -19,7 +21,14 @@ def ellipse(centre, half_width, half_height, n=120) -> np.ndarray:
     )
 
 
-def draw_mouth(
+def draw_mouth(*shape, **options):
+    """A mouth of `drawn_mouth`; each is drawn once, and whoever asks has a copy of the arrays."""
+    image, landmarks, label = drawn_mouth(*shape, **options)
+    return image.copy(), landmarks.copy(), label
+
+
+@cache
+def drawn_mouth(
     opening=10.0,
     height=26.0,
     width=52.0,

@@ -50,9 +50,21 @@ def name_of(path):
 
 
 @cache
+def texts(folder):
+    """Path -> text of every Python file below a folder of the project."""
+    return {path: path.read_text() for path in sorted((ROOT / folder).rglob("*.py"))}
+
+
+@cache
+def trees(folder):
+    """Path -> syntax tree of the same files."""
+    return {path: ast.parse(text) for path, text in texts(folder).items()}
+
+
+@cache
 def modules():
     """Module name -> its syntax tree."""
-    return {name_of(path): ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
+    return {name_of(path): tree for path, tree in trees("src/vermilion").items()}
 
 
 @cache
@@ -104,26 +116,28 @@ def test_no_circle_of_imports():
 
 @pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
 def test_a_module_is_one_idea(folder):
-    paths = list((ROOT / folder).rglob("*.py"))
-    assert paths
-    long = {str(p.relative_to(ROOT)): len(p.read_text().splitlines()) for p in paths}
+    assert texts(folder)
+    long = {str(p.relative_to(ROOT)): len(t.splitlines()) for p, t in texts(folder).items()}
     assert {name: lines for name, lines in long.items() if lines > MODULE_LINES} == {}
 
 
+@cache
 def functions(folder):
-    for path in sorted((ROOT / folder).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                place = str(path.relative_to(ROOT / folder))
-                if (place, node.name) not in KERNELS:
-                    yield f"{folder}/{place}:{node.name}", node
+    """Place -> each function below a folder of the project, without the kernels."""
+    return {
+        f"{path.relative_to(ROOT)}:{node.lineno}:{node.name}": node
+        for path, tree in trees(folder).items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (str(path.relative_to(ROOT / folder)), node.name) not in KERNELS
+    }
 
 
 @pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
 def test_a_function_fits_on_a_screen(folder):
     long = {
         name: node.end_lineno - node.lineno + 1
-        for name, node in functions(folder)
+        for name, node in functions(folder).items()
         if node.end_lineno - node.lineno + 1 > FUNCTION_LINES
     }
     assert long == {}
@@ -132,7 +146,7 @@ def test_a_function_fits_on_a_screen(folder):
 @pytest.mark.parametrize("folder", ["src/vermilion", "workflow/scripts", "benchmarks"])
 def test_a_function_has_few_parameters(folder):
     many = {}
-    for name, node in functions(folder):
+    for name, node in functions(folder).items():
         arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
         count = sum(argument.arg not in ("self", "cls") for argument in arguments)
         if count > PARAMETERS:

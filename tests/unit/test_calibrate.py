@@ -60,7 +60,7 @@ def board_image(board: Board) -> np.ndarray:
     return image
 
 
-def render(board: Board, camera: Camera, world_from_board: np.ndarray, over: int = 4) -> np.ndarray:
+def render(board: Board, camera: Camera, world_from_board: np.ndarray, over: int = 3) -> np.ndarray:
     """The board in a grey image, box-filtered from `over` squared samples a pixel."""
     image = board_image(board)
     corners_mm = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)

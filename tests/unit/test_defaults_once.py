@@ -88,11 +88,13 @@ def test_settings_have_the_defaults_of_the_configuration(name):
 @pytest.mark.parametrize("name", sorted(FUNCTIONS))
 def test_keywords_have_the_defaults_of_the_configuration(name):
     parameters = inspect.signature(found(name)).parameters
+    defaults = {keyword: parameters[keyword].default for keyword in FUNCTIONS[name]}
+    without = [key for key, value in defaults.items() if value is inspect.Parameter.empty]
+    assert without == [], "these have no default any more: remove the pairs"
     wrong = {
-        keyword: (parameters[keyword].default, configured(key))
-        for keyword, key in FUNCTIONS[name].items()
-        if parameters[keyword].default is not inspect.Parameter.empty
-        and plain(parameters[keyword].default) != configured(key)
+        keyword: (value, configured(FUNCTIONS[name][keyword]))
+        for keyword, value in defaults.items()
+        if plain(value) != configured(FUNCTIONS[name][keyword])
     }
     assert wrong == {}
 
@@ -127,3 +129,4 @@ def test_every_class_with_defaults_has_a_section_or_a_reason():
     without = sorted(known - set(CLASSES) - set(WITHOUT_SECTION))
     assert without == [], "pair these with a section of the configuration, or take the defaults out"
     assert sorted(set(WITHOUT_SECTION) - known) == [], "no class has such defaults any more"
+    assert sorted(set(WITHOUT_SECTION) & set(CLASSES)) == [], "a section and a reason for none"

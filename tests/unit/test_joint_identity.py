@@ -1,6 +1,7 @@
 """A known person on known images: what images add to landmarks that are off."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,13 +34,20 @@ def model_with_identities():
     return replace(model, identities_mm=np.array(shapes, dtype=np.float32))
 
 
-def scene(noise_px=3.0):
-    """(model, problem, images): landmarks of a person, off by the same in every frame."""
+@cache
+def seen_person():
+    """(model, meshes, images) of the person."""
     model = model_with_identities()
     offsets = np.tensordot(PERSON, model.identities_mm, axes=1)
     truth = motion(3 * N_FRAMES)[::3]
     truth[0, 6:] = 0.0
     meshes = [mesh_of(model, row, offsets) for row in truth]
+    return model, meshes, [image_of(model, mesh) for mesh in meshes]
+
+
+def scene(noise_px=3.0):
+    """(model, problem, images): landmarks of a person, off by the same in every frame."""
+    model, meshes, images = seen_person()
     points = np.stack([CAMERA.project(mesh[model.landmarks]) for mesh in meshes])
     points += noise_px * np.random.default_rng(3).normal(size=(1, 66, 2))
     centre = CAMERA.calibration[:2, 2]
@@ -50,7 +58,6 @@ def scene(noise_px=3.0):
         fit=LandmarkFitSettings(noise=loose, jaw_slide=1.0),
         bias=LandmarkNoise(0.2, 0.2, 0.2, 0.2, 0.2),
     )
-    images = [image_of(model, mesh) for mesh in meshes]
     return model, IdentityProblem(model, [sample], settings), images
 
 

@@ -21,7 +21,7 @@ from vermilion.contours.track_ridge import TrackRidgeDetector, learn_borders, mo
 from vermilion.evaluation.contour_error import distance_to_polyline
 
 CENTRE, WIDTH = (120.0, 150.0), 52.0
-SHAPES = [(4.0, 22.0), (12.0, 28.0), (7.0, 24.0), (9.0, 26.0), (14.0, 30.0), (10.0, 25.0)]
+SHAPES = [(4.0, 22.0), (12.0, 28.0), (7.0, 24.0), (14.0, 30.0)]
 
 
 def rings(opening, height, outer_px=0.0, inner_px=0.0):

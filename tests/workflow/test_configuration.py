@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from vermilion.config.load import load_configuration
-from vermilion.config.moved import MOVED
+from vermilion.config.moved import MOVED, REMOVED
 from vermilion.config.reference import generated_files
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO
@@ -104,19 +104,41 @@ def test_generated_files_are_up_to_date(name):
     assert stored == expected, "run `make docs`:\n" + "\n".join(difference)
 
 
-@pytest.mark.parametrize(("old", "new"), sorted(MOVED.items()))
-def test_key_of_an_earlier_version_is_named_with_its_new_name(old, new):
+def error_of_key(key):
+    """What the check says of a configuration that sets this key alone."""
     raw = {"takes": str(ROOT / "config/takes.tsv")}
     section = raw
-    *parts, last = old.split(".")
+    *parts, last = key.split(".")
     for part in parts:
         section = section.setdefault(part, {})
     section[last] = True
     with pytest.raises(ConfigurationError) as caught:
         load_configuration(raw, "old.yaml", check_disk=False)
-    message = str(caught.value)
-    assert f"key {old}: found a key of an earlier version; expected {new}" in message
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("old", "new"), sorted(MOVED.items()))
+def test_key_of_an_earlier_version_is_named_with_its_new_name(old, new):
+    message = error_of_key(old)
+    assert f"key {old}: found a key of an earlier version; expected {new}. Rename it." in message
     assert "unknown key" not in message
+
+
+@pytest.mark.parametrize(("key", "reason"), sorted(REMOVED.items()))
+def test_key_that_is_gone_is_named_with_the_reason(key, reason):
+    message = error_of_key(key)
+    assert f"key {key}: found a key of an earlier version; expected none" in message
+    assert reason in message and message.endswith("Remove it.")
+    assert "unknown key" not in message
+
+
+def test_no_key_that_is_gone_is_a_key():
+    for key in REMOVED:
+        section = Configuration
+        *parts, last = key.split(".")
+        for part in parts:
+            section = section.model_fields[part].annotation
+        assert last not in section.model_fields
 
 
 def test_every_new_name_is_a_key():

@@ -8,10 +8,9 @@ outside the model's space; and how much of the image each step explains.
 TRACKED_ROLES = ("tattoo", "video")
 
 
-def external_takes(wildcards=None):
-    """Regular expression of the takes that bring their own meshes (none: matches nothing)."""
-    names = sorted({take.take.replace(".", r"\.") for take in takes("tracked")})
-    return "|".join(names) or "(?!)"
+def one_of(names):
+    """Regular expression of names (none: matches nothing)."""
+    return "|".join(sorted({name.replace(".", r"\.") for name in names})) or "(?!)"
 
 
 def identity_takes(wildcards):
@@ -48,12 +47,6 @@ def image_identity_subjects():
     if not CONFIG.tracking.identity.images.enabled:
         return set()
     return {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
-
-
-def image_identity_pattern():
-    """Regular expression of these subjects (none: matches nothing)."""
-    names = sorted(subject.replace(".", r"\.") for subject in image_identity_subjects())
-    return "|".join(names) or "(?!)"
 
 
 rule identity:
@@ -98,7 +91,7 @@ rule image_identity:
     benchmark:
         P.benchmark("image_identity", "subject")
     wildcard_constraints:
-        subject=image_identity_pattern(),
+        subject=one_of(image_identity_subjects()),
     resources:
         mem_mb=1500,
         runtime=30,
@@ -410,7 +403,7 @@ rule tracked_meshes:
     benchmark:
         P.benchmark("tracked_meshes", "chunk")
     wildcard_constraints:
-        take=external_takes(),
+        take=one_of(take.take for take in takes("tracked")),
     resources:
         mem_mb=1500,
         runtime=30,
@@ -433,7 +426,7 @@ rule tracked_topology:
     benchmark:
         P.benchmark("tracked_topology", "take")
     wildcard_constraints:
-        take=external_takes(),
+        take=one_of(take.take for take in takes("tracked")),
     localrule: True
     resources:
         mem_mb=1500,

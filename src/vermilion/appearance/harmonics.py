@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-N_HARMONICS = 9
-
 
 def harmonics(normals: np.ndarray) -> np.ndarray:
     """Harmonics (..., 9) of unit normals (..., 3): 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.

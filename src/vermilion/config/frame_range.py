@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ def frame_range(source: str | Path, role: str) -> tuple[int, int]:
 def _mesh_range(source: Path) -> tuple[int, int]:
     """Frames of a folder of meshes or of an `.npz`."""
     if source.is_dir():
-        numbers = list(numbered_files(source, MESH_SUFFIXES))
+        numbers: Sequence[int] = list(numbered_files(source, MESH_SUFFIXES))
     elif source.suffix.lower() == ".npz":
         try:
             with np.load(source, allow_pickle=False) as data:

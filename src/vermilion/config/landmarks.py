@@ -163,9 +163,7 @@ class LandmarksConfig(StageConfig):
         "else to `trained`. `trained`: the embedded regressor, trained on `training_takes`. `onnx`: "
         "the networks in `models`. `csv`: files of another tracker.",
     )
-    mediapipe: MediapipeConfig = Field(
-        default_factory=MediapipeConfig, description="The attention mesh of mediapipe."
-    )
+    mediapipe: MediapipeConfig = section(MediapipeConfig, "The attention mesh of mediapipe.")
     models: str = Field(
         "",
         description="`onnx`, or in place of `mediapipe`: folder with OpenSeeFace's mnv3_detection_opt.onnx and "

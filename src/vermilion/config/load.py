@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vermilion.config.cross_checks import cross_checks
-from vermilion.config.moved import moved_keys, new_key
+from vermilion.config.moved import earlier_key, earlier_keys
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.imaging.frames import list_frames
@@ -33,15 +33,15 @@ def load_configuration(
         ConfigurationError: listing every problem of both files.
     """
     problems = [
-        f"{origin}, key {old}: found a key of an earlier version; expected {new}. Rename it."
-        for old, new in moved_keys(raw).items()
+        f"{origin}, key {key}: found a key of an earlier version; {sentence}"
+        for key, sentence in earlier_keys(raw).items()
     ]
     configuration = None
     try:
         configuration = Configuration(**raw)
     except ValidationError as error:
-        # A moved key is unknown as well: it is named once, with its new name.
-        unknown = [item for item in error.errors() if not (problems and _is_moved(item))]
+        # A key of an earlier version is unknown as well: it is named once.
+        unknown = [item for item in error.errors() if not (problems and _is_earlier(item))]
         problems += [_sentence(origin, item) for item in unknown]
     sheet = raw.get("takes", Configuration.model_fields["takes"].default)
     takes, wrong = read_takes(str(sheet))
@@ -124,10 +124,10 @@ def _refused(present: dict[int, Path], take: Take, reading: ImageReading) -> lis
     return [reason] if reason else []
 
 
-def _is_moved(item: ErrorDetails) -> bool:
-    """Whether an error of the schema is an unknown key that has moved."""
+def _is_earlier(item: ErrorDetails) -> bool:
+    """Whether an error of the schema is a key of an earlier version."""
     key = ".".join(str(part) for part in item["loc"])
-    return item["type"] == "extra_forbidden" and new_key(key) is not None
+    return item["type"] == "extra_forbidden" and earlier_key(key) is not None
 
 
 def _sentence(origin: str, item: ErrorDetails) -> str:

@@ -1,8 +1,8 @@
-"""Keys of earlier versions, and where they are now."""
+"""Keys of earlier versions: where they are now, or why they are gone."""
 
 from __future__ import annotations
 
-#: Old key -> new key; a key below an old one moves with it.
+#: Old key -> new key; a key below an old one moves with it. The first that matches counts.
 MOVED = {
     "refinement.photometric": "tracking.image_fit.enabled",
     "refinement.layer": "tracking.offsets.enabled",
@@ -14,7 +14,17 @@ MOVED = {
     "refinement": "tracking.image_fit",
     "detail.shading": "detail.relief",
     "tracking.identity.pictures": "tracking.identity.images",
+    "correction.image.closed": "correction.image.closed_gap_iod",
+    "correction.picture.closed": "correction.image.closed_gap_iod",
     "correction.picture": "correction.image",
+}
+
+_AS_DRAWN = "Contour labels count as drawn now; none is moved or left out."
+
+#: Keys that are gone -> the reason.
+REMOVED = {
+    "contours.detector.label_tolerance": _AS_DRAWN,
+    "contours.detector.label_reach": _AS_DRAWN,
 }
 
 
@@ -26,17 +36,25 @@ def new_key(old: str) -> str | None:
     return None
 
 
-def moved_keys(section: object, prefix: str = "") -> dict[str, str]:
-    """Old key -> new key, of all keys of a configuration (nested mappings) that have moved."""
+def earlier_key(key: str) -> str | None:
+    """What became of a key of an earlier version, as a sentence; None where it was never one."""
+    if key in REMOVED:
+        return f"expected none: this key is gone. {REMOVED[key]} Remove it."
+    target = new_key(key)
+    return target and f"expected {target}. Rename it."
+
+
+def earlier_keys(section: object, prefix: str = "") -> dict[str, str]:
+    """Key -> what became of it, of all keys of a configuration (nested mappings) that are old."""
     if not isinstance(section, dict):
         return {}
     found: dict[str, str] = {}
     for name, value in section.items():
         key = f"{prefix}{name}"
-        below = moved_keys(value, f"{key}.")
-        target = new_key(key)
+        below = earlier_keys(value, f"{key}.")
+        sentence = earlier_key(key)
         if below:
             found |= below
-        elif target is not None:
-            found[key] = target
+        elif sentence is not None:
+            found[key] = sentence
     return found

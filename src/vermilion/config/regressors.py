@@ -104,7 +104,7 @@ def is_variant(regressor: str) -> bool:
 def in_order(regressors: Iterable[str]) -> list[str]:
     """Regressors in the order of the paper's table, variants after them."""
 
-    def place(name: str):
+    def place(name: str) -> tuple[bool, int, str, str]:
         kind, _, variant = kind_of(name).partition("/")
         rank = _ORDER.index(kind) if kind in _ORDER else len(_ORDER)
         return is_variant(name), rank, variant, name

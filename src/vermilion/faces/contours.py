@@ -111,8 +111,13 @@ def contour_halves(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A lip contour, which may start anywhere and run either way, as two open vertex paths.
 
+    Args:
+        neutral_mm: (V, 3) head frame, mm.
+        landmarks: (66,) vertex ids.
+        loop: (N,) vertex ids of the contour.
+
     Returns:
-        the upper lip's path from the subject's right corner to the left, and the lower lip's back from
+        two arrays (n,) of vertex ids: the upper lip's path from the subject's right corner to the left, and the lower lip's back from
         the left corner to the right; both corners are in both.
     """
     points = neutral_mm[loop]

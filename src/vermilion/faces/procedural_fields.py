@@ -120,13 +120,7 @@ class Fields:
 
         `angle_rad` (N_LOOP,); positive turns the red inwards on both lips.
         """
-        theta = loop_theta()
-        step = 1e-3
-        ahead, behind = (self._axis(theta + d) for d in (step, -step))
-        tangent = ahead - behind
-        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-        axis, direction = self.carried(self._axis(theta)), self.carried(tangent)
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True) + 1e-12
+        axis, direction = self._roll_axes
         fade = np.clip(1.0 - (self.mesh.distance_mm / reach_mm) ** 2, 0, 1) ** 3
         angle = -self.carried(angle_rad) * fade * (1.0 - smoothstep(1.15, 2.1, self.mesh.s))
         arm = self.mesh.point_mm - axis
@@ -134,6 +128,23 @@ class Fields:
         across = arm - along
         cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
         return across * (cosine - 1.0) + np.cross(direction, across) * sine
+
+    @cached_property
+    def _roll_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """A point (V, 3) mm and the direction (V, 3) of each vertex's axis of rolling."""
+        theta = loop_theta()
+        step = 1e-3
+        ahead, behind = (self._axis(theta + d) for d in (step, -step))
+        tangent = ahead - behind
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        axis, direction = self.carried(self._axis(theta)), self.carried(tangent)
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True) + 1e-12
+        return axis, direction
+
+    @cached_property
+    def _meeting(self) -> np.ndarray:
+        """(V, 3) mm: where the lips meet, carried to every vertex."""
+        return self.carried(lip_point(loop_theta(), np.ones(N_LOOP)))
 
     @staticmethod
     def _axis(theta: np.ndarray) -> np.ndarray:
@@ -150,10 +161,9 @@ class Fields:
 
         `share` (N_LOOP,) of the way, along the lips' loop.
         """
-        meeting = self.carried(lip_point(loop_theta(), np.ones(N_LOOP)))
         fade = np.clip(1.0 - (self.mesh.distance_mm / reach_mm) ** 2, 0, 1) ** 3 * self._inside
         inside = 1.0 - smoothstep(1.0, 1.6, self.mesh.s)
-        arm = (meeting - self.mesh.point_mm) * np.array([0.0, 1.0, 0.8])
+        arm = (self._meeting - self.mesh.point_mm) * np.array([0.0, 1.0, 0.8])
         limit = np.clip(10.0 / (np.linalg.norm(arm, axis=1) + 1e-9), 0, 1)
         return arm * (self.carried(share) * fade * inside * limit)[:, None]
 

@@ -124,7 +124,7 @@ def chart_of(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
 
 
 def base_point(w: np.ndarray) -> np.ndarray:
-    """The head without features, `w` (N,) complex in the chart -> (N, 3) mm."""
+    """The head without features, `w` (..., N) complex in the chart -> (..., N, 3) mm."""
     polar, azimuth = chart_angles(w)
     cosine, sine = np.cos(azimuth), np.sin(azimuth)
     exponent = 2.0 / _ROUNDNESS_AT(polar)[..., 0]
@@ -202,7 +202,7 @@ def chart_at(xy: np.ndarray, steps: int = 12) -> np.ndarray:
     w = np.zeros(len(xy), dtype=complex)
     delta = 1e-5
     for _ in range(steps):
-        at, right, up = (base_point(w + d) for d in (0, delta, 1j * delta))
+        at, right, up = base_point(np.stack([w, w + delta, w + 1j * delta]))
         fx = (right[:, 0] - at[:, 0]) / delta, (up[:, 0] - at[:, 0]) / delta
         fy = (right[:, 1] - at[:, 1]) / delta, (up[:, 1] - at[:, 1]) / delta
         residual = target - (at[:, 0] + 1j * at[:, 1])

@@ -123,8 +123,8 @@ def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     height = border_height(u, upper) + 2.5 * behind * (1 - middle)
     gap = 0.5 * REST_GAP_MM * middle * np.clip(s / 0.75, 0.0, 1.0) ** 2
     y = lip_line_y(u) + sign * (share * height + gap)
-    border_z = skin_point(chart_at(_border_xy(u, upper)))[:, 2]
-    upper_z = skin_point(chart_at(_border_xy(u, np.ones(len(u), dtype=bool))))[:, 2]
+    borders = [_border_xy(u, upper), _border_xy(u, np.ones(len(u), dtype=bool))]
+    border_z, upper_z = skin_point(chart_at(np.concatenate(borders)))[:, 2].reshape(2, -1)
     meeting_z = upper_z + _CORNER_MEETING_MM * (1 - middle)
     leaving = smoothstep(0.0, 1.0, np.clip(s, 0.0, 1.0))
     corner = np.where(s > 1.0, _CORNER_FOLD(np.maximum(s, 1.0)), 0.0)

@@ -11,9 +11,6 @@ from vermilion.faces.procedural_head import EYE_CENTRE_MM, EYE_RADIUS_MM
 from vermilion.faces.procedural_layout import strip_triangles
 from vermilion.faces.procedural_mouth import STOMION_Y_MM
 
-IRIS_RADIUS_MM = 5.8
-PUPIL_RADIUS_MM = 2.0
-
 
 @dataclass(frozen=True)
 class Part:

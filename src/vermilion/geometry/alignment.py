@@ -26,7 +26,7 @@ class Similarity:
         return self.scale * points @ self.rotation.T + self.translation
 
     def turn(self, vectors: np.ndarray) -> np.ndarray:
-        """Displacements (..., 3) of the source frame in the target frame, (..., 3)."""
+        """Displacements `vectors` (..., 3) of the source frame in the target frame, (..., 3)."""
         return self.scale * vectors @ self.rotation.T
 
 
@@ -73,7 +73,7 @@ class FrameAlignment:
     error_mm: np.ndarray
 
     def apply(self, sequence_mm: np.ndarray) -> np.ndarray:
-        """Points (F, V, 3) mm of the source's frames in the target's, (F, V, 3) float64."""
+        """Points `sequence_mm` (F, V, 3) of the source's frames in the target's, (F, V, 3) float64."""
         return move_frames(sequence_mm, self.rotations, self.translations_mm)
 
     def __getitem__(self, frames: np.ndarray | slice) -> FrameAlignment:

@@ -116,9 +116,10 @@ class Surface:
 
 @numba.njit(cache=True)
 def _closest_of(  # pragma: no cover - compiled
-    points, normals, sides, rows, candidates, corners, face_normals, face_sides,
-    min_cosine, best, triangle, barycentric,
-):  # fmt: skip
+    points: np.ndarray, normals: np.ndarray, sides: np.ndarray, rows: np.ndarray,
+    candidates: np.ndarray, corners: np.ndarray, face_normals: np.ndarray, face_sides: np.ndarray,
+    min_cosine: float, best: np.ndarray, triangle: np.ndarray, barycentric: np.ndarray,
+) -> None:  # fmt: skip
     """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
     for index in range(len(rows)):
         row = rows[index]
@@ -145,7 +146,9 @@ def _closest_of(  # pragma: no cover - compiled
 
 
 @numba.njit(cache=True, inline="always")
-def _project(px, py, pz, abc):  # pragma: no cover - compiled
+def _project(  # pragma: no cover - compiled
+    px: float, py: float, pz: float, abc: np.ndarray
+) -> tuple[float, float, float]:
     """Barycentric weights of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
     abx, aby, abz = abc[1, 0] - abc[0, 0], abc[1, 1] - abc[0, 1], abc[1, 2] - abc[0, 2]
     acx, acy, acz = abc[2, 0] - abc[0, 0], abc[2, 1] - abc[0, 1], abc[2, 2] - abc[0, 2]
@@ -193,7 +196,9 @@ def closest_barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(cache=True)
-def _closest_weights(points, corners):  # pragma: no cover - compiled
+def _closest_weights(  # pragma: no cover - compiled
+    points: np.ndarray, corners: np.ndarray
+) -> np.ndarray:
     """`closest_barycentric`, compiled."""
     weights = np.empty((len(points), 3))
     for row in range(len(points)):

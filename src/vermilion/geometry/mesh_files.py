@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,8 @@ def read_mesh(path: str | Path) -> Mesh:
     import trimesh  # costs two seconds to import, and few callers need it
 
     try:
-        mesh = trimesh.load(path, process=False, maintain_order=True, force="mesh")
+        # `force` makes it a Trimesh, which the annotations of trimesh do not tell.
+        mesh: Any = trimesh.load(path, process=False, maintain_order=True, force="mesh")
     except Exception as error:
         raise InputError(
             f"an unreadable mesh ({error})", "PLY or OBJ", "Export the mesh again.", path=path

@@ -130,6 +130,7 @@ def register(
             sides,
             triangle_sides,
         )
+        assert targets.distance_mm is not None  # a search gives it
         reach = schedule.search_distance_mm * max(relative, schedule.narrowest)
         met = searching & (targets.distance_mm < reach) & ~_on_border(targets, onto)
         found = targets.sample(onto.vertices_mm, onto.triangles)

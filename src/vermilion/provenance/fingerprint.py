@@ -44,12 +44,7 @@ def imported_files(script: Path, source: Path = SOURCE) -> set[Path]:
 
 @cache
 def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
-
-
-@cache
-def _tree_text(path: Path) -> str:
-    """The syntax tree without docstrings, as text."""
+    """The syntax tree without docstrings."""
     tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     for node in ast.walk(tree):
         if (
@@ -57,7 +52,12 @@ def _tree_text(path: Path) -> str:
             and ast.get_docstring(node, clean=False) is not None
         ):
             node.body = node.body[1:] or [ast.Pass()]
-    return ast.dump(tree)
+    return tree
+
+
+@cache
+def _tree_text(path: Path) -> str:
+    return ast.dump(_tree(path))
 
 
 @cache

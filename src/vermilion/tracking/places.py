@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
@@ -19,12 +18,9 @@ from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
-from vermilion.scan.views import ScanViews, camera_towards
 from vermilion.storage.arrays import read_arrays, write_arrays
-from vermilion.storage.errors import InputError
 
 _HIDDEN = ("mouth_inner", "teeth", "eyes")  # regions that no landmark lies on
 
@@ -60,7 +56,7 @@ class LandmarkPlaces:
         )
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As arrays, from which `from_arrays` makes the same."""
+        """As arrays, from which `from_arrays` makes the same: triangle (N,), barycentric (N, 3)."""
         return {
             "landmark_set": np.array(self.landmark_set.name),
             "triangle": self.points.triangle,
@@ -70,51 +66,19 @@ class LandmarkPlaces:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> LandmarkPlaces:
-        """Of what `arrays` gave."""
+        """Of what `arrays` gave: triangle (N,), barycentric (N, 3)."""
         points = SurfacePoints(arrays["triangle"], arrays["barycentric"])
         return cls(set_of(str(arrays["landmark_set"])), points, arrays["triangles"])
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(path, **self.arrays())
+        write_arrays(path, compressed=False, **self.arrays())
 
     @classmethod
     def load(cls, path: str | Path) -> LandmarkPlaces:
         """Read what `save` wrote. Raises InputError on a damaged file."""
         names = ("landmark_set", "triangle", "barycentric", "triangles")
         return cls.from_arrays(read_arrays(path, "file of landmark places", names))
-
-
-class ShapeDetector(Protocol):
-    """Finds points with their depth, as `landmarks.mediapipe` does."""
-
-    landmark_set: LandmarkSet
-
-    def detect(self, linear_rgb: np.ndarray):
-        """`Landmarks` with `depth_px`."""
-
-
-def detected_shape(model: FaceModel, detector: ShapeDetector) -> np.ndarray:
-    """What a detector sees of the model's bare neutral from the front: (N, 3), any scale and origin.
-
-    Axes as the head frame's: x to the subject's left, y up, z out of the face.
-
-    Raises:
-        InputError: no face found.
-    """
-    middle = model.neutral_mm[model.landmarks].mean(axis=0)
-    camera = camera_towards(
-        middle, 260.0, np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 640
-    )
-    image = ScanViews(Mesh(model.neutral_mm, model.triangles)).image(camera)
-    found = detector.detect(image.astype(np.float32))
-    if not found.found or found.depth_px is None:
-        raise InputError(
-            f"no face in an image of the face model '{model.name}'",
-            "one that the landmark detector knows",
-            "Set landmarks.detector to another kind.",
-        )
-    return np.column_stack([found.points_px * [1.0, -1.0], -found.depth_px])
 
 
 def register_places(
@@ -156,6 +120,7 @@ def _closest_skin(model: FaceModel, points: np.ndarray) -> tuple[SurfacePoints, 
     hidden = np.any([model.regions[name] for name in _HIDDEN], axis=0)
     skin = np.flatnonzero(~hidden[model.triangles].any(axis=1))
     found = Surface(model.neutral_mm, model.triangles[skin]).closest(points)
+    assert found.distance_mm is not None  # a search gives it
     return SurfacePoints(skin[found.triangle], found.barycentric), found.distance_mm
 
 

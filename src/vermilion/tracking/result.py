@@ -75,7 +75,8 @@ class Identity:
         """Write `.npz`, whole or not at all."""
         arrays = {name: np.asarray(getattr(self, name)) for name in _names(Identity)}
         places = {} if self.places is None else self.places.arrays()
-        write_arrays(path, **arrays, **{f"places/{key}": value for key, value in places.items()})
+        places = {f"places/{key}": value for key, value in places.items()}
+        write_arrays(path, compressed=False, **arrays, **places)
 
     @classmethod
     def load(cls, path: str | Path) -> Identity:
@@ -191,9 +192,8 @@ class TrackedTake:
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
-        write_arrays(
-            path, **{name: np.asarray(getattr(self, name)) for name in _names(TrackedTake)}
-        )
+        arrays = {name: np.asarray(getattr(self, name)) for name in _names(TrackedTake)}
+        write_arrays(path, compressed=False, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> TrackedTake:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import SupportsIndex
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from vermilion.appearance.samples import sample_skin
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_matrix
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope
 from vermilion.tracking.identity.colour_residuals import (
     IdentityImageSettings,
@@ -91,7 +93,17 @@ def fit_joint_identity(
 class _JointProblem:
     """The energy (a `GaussNewtonProblem`) with light, visibility and resolution of one state."""
 
-    def __init__(self, model, problem, samples, images, cameras, settings, frames, shared):
+    def __init__(
+        self,
+        model: FaceModel,
+        problem: IdentityProblem,
+        samples: SurfacePoints,
+        images: Sequence[np.ndarray],
+        cameras: Sequence[Camera],
+        settings: IdentityImageSettings,
+        frames: np.ndarray,
+        shared: np.ndarray,
+    ):
         self.problem, self.samples, self.settings = problem, samples, settings
         self.n_identity = problem.n_identity
         self.centre = shared[: self.n_identity].copy()
@@ -117,7 +129,9 @@ class _JointProblem:
         """Weights of the face's shapes: blend weights (K,), then the change of identity (I,)."""
         return np.concatenate([row[N_POSE:], shared[: self.n_identity] - self.centre])
 
-    def _sampled(self, index: int, frames: np.ndarray, shared: np.ndarray) -> SampledFrame:
+    def _sampled(
+        self, index: SupportsIndex, frames: np.ndarray, shared: np.ndarray
+    ) -> SampledFrame:
         row, weights = frames[index], self._weights(frames[index], shared)
         rotation = rotation_matrix(row[:3]) @ self.problem.reference
         turned = self.face.points(weights) @ rotation.T

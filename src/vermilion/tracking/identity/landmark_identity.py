@@ -148,21 +148,18 @@ class IdentityProblem:
         self.frame_prior = np.zeros((self.n_frames, N_POSE + self.n_weights))
         self.frame_prior[:, N_POSE:] = sigma[:, None] ** -2.0
         self.guess = np.log([sample.focal_px for sample in samples])
+        self.centre = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
         # A known focal length is one whose prior is so tight that it cannot move.
+        bias_mm = settings.bias.per_landmark(self.landmark_set) * self.shape.interocular_mm
         loose = np.array([not sample.calibrated for sample in samples])
         self.shared_prior = np.concatenate(
             [
                 np.ones(self.n_identity),
-                np.repeat(self._bias_mm() ** -2.0, 3),
+                np.repeat(bias_mm**-2.0, 3),
                 np.where(loose, settings.focal_sigma**-2.0, 1e12),
             ]
         )
         self.sigma_mm = self.shape.sigma_mm(settings.fit.noise)
-
-    def _bias_mm(self) -> np.ndarray:
-        """Deviations (N,) of the landmarks' offsets."""
-        bias = self.settings.bias.per_landmark(self.landmark_set)
-        return bias * self.shape.interocular_mm
 
     def first_guess(self) -> tuple[np.ndarray, np.ndarray]:
         """Frames (F, 6 + K) fitted to the mean face, and shared unknowns (S,) at their priors."""
@@ -178,13 +175,11 @@ class IdentityProblem:
         vectors, self.reference = log_about_mean(rotation)
         self.sigma_px = self.sigma_mm * (np.exp(self.guess)[self.take] / translation[:, 2])[:, None]
         frames = np.concatenate([vectors, translation, weights], axis=1)
-        shared = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
-        return frames, shared
+        return frames, self.centre.copy()
 
     def _neutral(self, shared: np.ndarray) -> np.ndarray:
-        offset = self._offset(shared)
         person = np.tensordot(shared[: self.n_identity], self.identities, axes=1)
-        return self.shape.neutral_mm + person + offset
+        return self.shape.neutral_mm + person + self._offset(shared)
 
     def _offset(self, shared: np.ndarray) -> np.ndarray:
         """(N, 3) mm."""
@@ -206,10 +201,6 @@ class IdentityProblem:
         points = shape.points(frames[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2)
         return points + frames[:, None, 3:6]
 
-    def _shared_from_prior(self, shared: np.ndarray) -> np.ndarray:
-        centre = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
-        return shared - centre
-
     def cost(self, frames: np.ndarray, shared: np.ndarray) -> float:
         """Energy of `frames` (F, 6 + K) and `shared` (S,); infinite behind the camera."""
         points = self._camera_points(frames, shared)
@@ -218,7 +209,7 @@ class IdentityProblem:
         _, _, residual = self._residual(points, self.focal(shared))
         total = robust_cost(residual, self.settings.fit.noise.robust_sigmas).sum()
         total += 0.5 * (self.frame_prior * frames**2).sum()
-        total += 0.5 * (self.shared_prior * self._shared_from_prior(shared) ** 2).sum()
+        total += 0.5 * (self.shared_prior * (shared - self.centre) ** 2).sum()
         return float(total)
 
     def _linearised(self, frames: np.ndarray, shared: np.ndarray):
@@ -263,7 +254,7 @@ class IdentityProblem:
             np.swapaxes(by_frame, 1, 2) @ by_shared,
             flat.T @ flat + np.diag(self.shared_prior),
             (residual[:, None] @ by_frame)[:, 0] + self.frame_prior * frames,
-            shared_gradient + self.shared_prior * self._shared_from_prior(shared),
+            shared_gradient + self.shared_prior * (shared - self.centre),
         )
 
     def newton_step(self, frames: np.ndarray, shared: np.ndarray):

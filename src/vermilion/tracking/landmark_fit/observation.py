@@ -130,7 +130,7 @@ def whitening(
         sigma_px: (F, N) deviations.
         trust: (F, N) confidence in [0, 1].
         jaw_slide: see above.
-        jaw_ids: landmarks of the jaw's line, in its order.
+        jaw_ids: (J,) landmarks of the jaw's line, in its order.
     """
     scale = np.sqrt(trust) / sigma_px
     result = scale[..., None, None] * np.eye(2)
