@@ -19,8 +19,10 @@ paper:
 - `curves`: samples of strokes, lips that press.
 - `silhouette`: where a mesh's lip contours are in a camera. `LipSurface`.
 - `refinement`: a frame moved onto its sketches (section 5, eq. 1). `SketchRefiner`.
-- `contact`: lips that do not pass through each other; volumes of the lips. `part_lips`, `LipVolumes`.
-- `row_solver`: few linear constraints beside a factored energy, for refinement and contact.
+- `contact`: lips that do not pass through each other; volumes of the lips. `separate_lips`,
+  `LipVolumes`.
+- `constrained_energy`: few linear constraints beside a factored energy, for refinement and contact.
+  `ConstrainedEnergy`.
 
 A take in a notebook:
 
@@ -31,7 +33,7 @@ A take in a notebook:
     result = propagator.correct(sequence_mm).vertices_mm
 """
 
-from vermilion.guided.contact import LipVolumes, part_lips
+from vermilion.guided.contact import LipVolumes, separate_lips
 from vermilion.guided.dirichlet import GradientIntegrator
 from vermilion.guided.gradients import NeutralTriangles
 from vermilion.guided.propagation import LipPropagator, Propagation
@@ -79,11 +81,11 @@ __all__ = [
     "SketchRefiner",
     "extreme_frames",
     "mouth_deformation",
-    "part_lips",
     "random_frames",
     "read_sketch",
     "regions_of_face",
     "regions_of_vertices",
+    "separate_lips",
     "sketch_of_json",
     "sketch_path",
     "sketch_paths",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.integration import cotangents, edge_stiffness
+from vermilion.geometry.cotangents import cotangents, edge_stiffness
 from vermilion.geometry.mesh import vertex_areas
 from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.regions import GuidedRegions

@@ -1,6 +1,6 @@
 """Deformation gradients of chosen triangles against the neutral (Guided18 section 4).
 
-`correction.gradients` is the definition; here the inverse of the neutral's frames is made once, and
+`geometry.deformation_gradients` is the definition; here the inverse of the neutral's frames is made once, and
 sequences go through a compiled loop. A test holds the two together.
 """
 

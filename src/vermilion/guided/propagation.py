@@ -9,13 +9,13 @@ from typing import Self
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.geometry.mesh import rigid_alignment
-from vermilion.guided.contact import part_lips
+from vermilion.geometry.alignment import FrameAlignment, align_frames
+from vermilion.guided.constrained_energy import ConstrainedEnergy
+from vermilion.guided.contact import separate_lips
 from vermilion.guided.dirichlet import FOLLOW_MM, GradientIntegrator
 from vermilion.guided.gradients import NeutralTriangles
 from vermilion.guided.reduced_regression import ReducedRegression
 from vermilion.guided.regions import GuidedRegions
-from vermilion.guided.row_solver import RowSolver
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError, ModelFileError
 
@@ -84,7 +84,7 @@ class LipPropagator:
         self._trusted = NeutralTriangles(rest, local.triangles[local.trusted])
         self._predicted = NeutralTriangles(rest, local.triangles[local.predicted])
         self._neutral_y = self._trusted.gradients(rest[None])
-        self._solver = RowSolver(self.integrator.factor, regions.free, regions.n_vertices)
+        self._energy = ConstrainedEnergy(self.integrator.factor, regions.free, regions.n_vertices)
         self.base = False
         self.regression: ReducedRegression | None = None
 
@@ -115,7 +115,7 @@ class LipPropagator:
         self.base = change and base_mm is not None
         if base_mm is not None:
             self._check_meshes(base_mm, "base frames")
-            aligned = _to_neutral(base_mm[:, self._mouth], motions)
+            aligned = motions.apply(base_mm[:, self._mouth])
         y = self._trusted.gradients(aligned)
         if self.base:
             x = x - self._predicted.gradients(aligned)
@@ -132,7 +132,7 @@ class LipPropagator:
         """Correct frames (F, V, 3); each result depends on its own frame alone.
 
         Args:
-            crossings: the lips, to part where one would pass through the other; None: the paper.
+            crossings: the lips, to separate where one would pass through the other; None: the paper.
 
         Raises:
             InputError: nothing was learnt yet, another topology, or a mesh that is not finite.
@@ -144,7 +144,7 @@ class LipPropagator:
         unexplained, depth = np.zeros(len(result)), np.zeros(len(result))
         for first in range(0, len(result), _BLOCK):
             part = slice(first, first + _BLOCK)
-            aligned, (rotation, translation) = self._aligned(result[part])
+            aligned, motions = self._aligned(result[part])
             y = self._trusted.gradients(aligned)
             unexplained[part] = self.regression.unexplained(y, self._neutral_y[0])
             x = self.regression.predict(y)
@@ -152,9 +152,10 @@ class LipPropagator:
                 x += self._predicted.gradients(aligned)
             corrected = self.integrator.integrate(x, aligned)
             if crossings is not None:
-                depth[part] = self._part_lips(corrected, aligned, crossings)
+                depth[part] = self._separate_lips(corrected, aligned, crossings)
             for ids in (self._local.free, self._local.followers):
-                moved = (corrected[:, ids] - translation[:, None]) @ rotation
+                moved = corrected[:, ids] - motions.translations_mm[:, None]
+                moved = moved @ motions.rotations
                 result[part, self._mouth[ids]] = moved
         return Propagation(result, unexplained, depth)
 
@@ -198,28 +199,24 @@ class LipPropagator:
         result.regression = ReducedRegression.from_arrays(arrays, str(path))
         return result
 
-    def _part_lips(
+    def _separate_lips(
         self, corrected: np.ndarray, aligned: np.ndarray, crossings: LipCrossings
     ) -> np.ndarray:
-        """Part the lips of meshes (F, U, 3) in place; depths (F,) mm that are left."""
+        """Separate the lips of meshes (F, U, 3) in place; depths (F,) mm that are left."""
         depth, mesh = np.zeros(len(corrected)), self.neutral_mm.copy()
         for f, mouth in enumerate(corrected):
             mesh[self._mouth] = mouth
-            parted = part_lips(mesh, crossings, self._solver)
-            depth[f] = parted.after_mm
-            mouth[:] = parted.vertices_mm[self._mouth]
+            found = separate_lips(mesh, crossings, self._energy)
+            depth[f] = found.after_mm
+            mouth[:] = found.vertices_mm[self._mouth]
         self.integrator.follow(corrected, aligned)
         return depth
 
-    def _aligned(self, meshes_mm: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """The mouths (F, U, 3) of meshes on the neutral; the motions (F, 3, 3), (F, 3) there."""
+    def _aligned(self, meshes_mm: np.ndarray) -> tuple[np.ndarray, FrameAlignment]:
+        """The mouths (F, U, 3) of meshes on the neutral, and the motions that took them there."""
         target = self.neutral_mm[self.stable]
-        pairs = [
-            rigid_alignment(np.asarray(mesh, np.float64), target)
-            for mesh in meshes_mm[:, self.stable]
-        ]
-        motions = tuple(np.stack(part) for part in zip(*pairs, strict=True))
-        return _to_neutral(meshes_mm[:, self._mouth], motions), motions
+        motions = align_frames(meshes_mm[:, self.stable], target, np.ones(len(target)))
+        return motions.apply(meshes_mm[:, self._mouth]), motions
 
     def _check_meshes(self, meshes_mm: np.ndarray, name: str) -> None:
         expected = self.neutral_mm.shape
@@ -239,12 +236,3 @@ class LipPropagator:
                 "finite vertices round the mouth",
                 "Leave these frames out.",
             )
-
-
-def _to_neutral(meshes_mm: np.ndarray, motions: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """(F, U, 3) vertices after the motions (F, 3, 3), (F, 3)."""
-    result = np.empty(meshes_mm.shape, dtype=np.float64)
-    for mesh, rotation, translation, moved in zip(meshes_mm, *motions, result, strict=True):
-        np.dot(mesh, rotation.T, out=moved)
-        moved += translation
-    return result

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.geometry.mesh import rigid_alignment, triangle_areas
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.mesh import triangle_areas
 from vermilion.guided.gradients import NeutralTriangles
 from vermilion.guided.regions import GuidedRegions
 from vermilion.storage.errors import InputError
@@ -47,8 +48,7 @@ def mouth_deformation(
     result = np.empty((len(sequence_mm), 9 * len(chosen)), dtype=np.float32)
     for f, mesh in enumerate(sequence_mm):
         mesh = np.asarray(mesh, dtype=np.float64)
-        rotation, translation = rigid_alignment(mesh[stable], neutral[stable])
-        aligned = mesh @ rotation.T + translation
+        aligned = similarity_alignment(mesh[stable], neutral[stable], scale=1.0).apply(mesh)
         result[f] = ((triangles.gradients(aligned[None]) - rest) * weight)[0]
     return result
 
