@@ -86,7 +86,7 @@ class LipVolumes:
         return cls(upper, lower, boundary_edges(upper), boundary_edges(lower))
 
     def measure(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """Volumes (F, 2) mm3 of the upper and the lower lip of meshes (F, V, 3).
+        """Volumes (F, 2) mm3 of the upper and the lower lip of meshes vertices_mm (F, V, 3).
 
         Between each lip's skin and the fan from the middle of its rim.
         """

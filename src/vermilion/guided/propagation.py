@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.geometry.alignment import FrameAlignment, align_frames
+from vermilion.geometry.alignment import move_frames, similarity_alignment
 from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.contact import separate_lips
 from vermilion.guided.dirichlet import FOLLOW_MM, GradientIntegrator
@@ -115,7 +115,7 @@ class LipPropagator:
         self.base = change and base_mm is not None
         if base_mm is not None:
             self._check_meshes(base_mm, "base frames")
-            aligned = motions.apply(base_mm[:, self._mouth])
+            aligned = move_frames(base_mm[:, self._mouth], *motions)
         y = self._trusted.gradients(aligned)
         if self.base:
             x = x - self._predicted.gradients(aligned)
@@ -129,9 +129,10 @@ class LipPropagator:
     def correct(
         self, sequence_mm: np.ndarray, crossings: LipCrossings | None = None
     ) -> Propagation:
-        """Correct frames (F, V, 3); each result depends on its own frame alone.
+        """Correct frames; each result depends on its own frame alone.
 
         Args:
+            sequence_mm: (F, V, 3), any rigid poses.
             crossings: the lips, to separate where one would pass through the other; None: the paper.
 
         Raises:
@@ -144,7 +145,7 @@ class LipPropagator:
         unexplained, depth = np.zeros(len(result)), np.zeros(len(result))
         for first in range(0, len(result), _BLOCK):
             part = slice(first, first + _BLOCK)
-            aligned, motions = self._aligned(result[part])
+            aligned, (rotations, translations_mm) = self._aligned(result[part])
             y = self._trusted.gradients(aligned)
             unexplained[part] = self.regression.unexplained(y, self._neutral_y[0])
             x = self.regression.predict(y)
@@ -154,8 +155,7 @@ class LipPropagator:
             if crossings is not None:
                 depth[part] = self._separate_lips(corrected, aligned, crossings)
             for ids in (self._local.free, self._local.followers):
-                moved = corrected[:, ids] - motions.translations_mm[:, None]
-                moved = moved @ motions.rotations
+                moved = (corrected[:, ids] - translations_mm[:, None]) @ rotations
                 result[part, self._mouth[ids]] = moved
         return Propagation(result, unexplained, depth)
 
@@ -163,16 +163,16 @@ class LipPropagator:
         """Write the fitted propagator as `.npz` (no pickle), whole or not at all."""
         if self.regression is None:
             raise InputError("no training to save", "a call of `fit` first", "Train first.")
-        write_arrays(
-            path,
-            propagator_version=np.int64(FORMAT_VERSION),
-            neutral_mm=self.neutral_mm,
-            stable=self.stable,
-            follow_mm=np.float64(self.follow_mm),
-            base=np.bool_(self.base),
+        arrays: dict[str, Any] = {
+            "propagator_version": np.int64(FORMAT_VERSION),
+            "neutral_mm": self.neutral_mm,
+            "stable": self.stable,
+            "follow_mm": np.float64(self.follow_mm),
+            "base": np.bool_(self.base),
             **self.regions.arrays(),
             **self.regression.arrays(),
-        )
+        }
+        write_arrays(path, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -212,11 +212,13 @@ class LipPropagator:
         self.integrator.follow(corrected, aligned)
         return depth
 
-    def _aligned(self, meshes_mm: np.ndarray) -> tuple[np.ndarray, FrameAlignment]:
-        """The mouths (F, U, 3) of meshes on the neutral, and the motions that took them there."""
+    def _aligned(self, meshes_mm: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """The mouths (F, U, 3) of meshes on the neutral; the motions (F, 3, 3), (F, 3) there."""
         target = self.neutral_mm[self.stable]
-        motions = align_frames(meshes_mm[:, self.stable], target, np.ones(len(target)))
-        return motions.apply(meshes_mm[:, self._mouth]), motions
+        stable = np.asarray(meshes_mm[:, self.stable], dtype=np.float64)
+        found = [similarity_alignment(mesh, target, scale=1.0) for mesh in stable]
+        motions = (np.stack([f.rotation for f in found]), np.stack([f.translation for f in found]))
+        return move_frames(meshes_mm[:, self._mouth], *motions), motions
 
     def _check_meshes(self, meshes_mm: np.ndarray, name: str) -> None:
         expected = self.neutral_mm.shape
@@ -226,10 +228,9 @@ class LipPropagator:
                 f"(frames, {expected[0]}, 3), the topology of the neutral",
                 "Resample the meshes onto the neutral's topology.",
             )
-        finite = [
-            np.isfinite(meshes_mm[:, ids]).all(axis=(1, 2)) for ids in (self._mouth, self.stable)
-        ]
-        bad = np.flatnonzero(~(finite[0] & finite[1]))
+        # A sum is finite where all of its terms are: one pass without an array of flags.
+        sums = [meshes_mm[:, ids].sum(axis=(1, 2)) for ids in (self._mouth, self.stable)]
+        bad = np.flatnonzero(~np.isfinite(sums).all(axis=0))
         if len(bad):
             raise InputError(
                 f"{name} with frames {bad[:10].tolist()} that are not finite",

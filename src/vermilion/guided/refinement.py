@@ -126,7 +126,7 @@ class View:
         return cls(camera, up, samples, weights)
 
     def contours(self, vertices_mm: np.ndarray, surface: LipSurface) -> dict[str, Segments]:
-        """Curve name -> where that contour of a mesh (V, 3) is now.
+        """Curve name -> where that contour of a mesh vertices_mm (V, 3) is now.
 
         Raises InputError where the camera sees no such contour.
         """
@@ -165,7 +165,7 @@ class SketchRefiner:
 
         Args:
             surface: where contours are looked for (`LipSurface.of_face`, `.of_regions`).
-            still: vertices that should hardly move; None: those that hang on the inner lips, which
+            still: (s,) vertices that should hardly move; None: those that hang on the inner lips, which
                 are hidden inside the mouth.
             crossings: the lips, to separate where one would pass through the other; None: the paper.
         """
@@ -174,7 +174,7 @@ class SketchRefiner:
         self._surface, self._crossings = surface, crossings
         position = np.full(regions.n_vertices, self.settings.position)
         position[regions.followers if still is None else still] = self.settings.still
-        matrix = _keeping_matrix(regions, self.movable, position, self.settings.regularity)
+        matrix = keeping_matrix(regions, self.movable, position, self.settings.regularity)
         self._energy = ConstrainedEnergy(CholeskyFactor(matrix), self.movable, regions.n_vertices)
 
     def refine(self, vertices_mm: np.ndarray, views: Sequence[tuple[Sketch, Camera]]) -> Refined:
@@ -268,10 +268,12 @@ def ray_constraints(
     )  # fmt: skip
 
 
-def _keeping_matrix(
+def keeping_matrix(
     regions: GuidedRegions, movable: np.ndarray, position: np.ndarray, regularity: float
 ) -> sparse.csr_matrix:
-    """Matrix (N, N) of sum_i lambda_i |x_i|^2 + lambda_reg |L x|^2 over the movable vertices.
+    """Matrix (N, N) of sum_i lambda_i |x_i|^2 + lambda_reg |L x|^2 over the movable vertices (N,).
+
+    `position` (V,) has the lambda_i.
 
     L = D - A, the symmetric Laplacian of Sorkine et al. 2004; rows of vertices that stay count,
     too, so that the rim shows no crease.

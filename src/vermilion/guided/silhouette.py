@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
-from vermilion.faces.lips import lip_sides, triangle_sides
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import boundary_edges, normalised, triangle_cross
@@ -37,7 +37,7 @@ class SurfaceEdges:
 
     @classmethod
     def of(cls, edges: np.ndarray, triangles: np.ndarray) -> SurfaceEdges:
-        """Edges (e, 2) of a mesh of triangles (T, 3)."""
+        """edges: (e, 2) ids, of a mesh of triangles (T, 3)."""
         ends = (
             SurfacePoints.on_edges(edges[:, 0], edges[:, 1], np.full(len(edges), share), triangles)
             for share in (0.0, 1.0)
@@ -53,7 +53,7 @@ class LipSurface:
         triangles: (T, 3) of the mesh.
         candidates: (n,) ids of the triangles that may carry the inner silhouette.
         around: (k, 3) triangles that touch their vertices, for the normals.
-        sides: (T,) int8: +1 upper lip, -1 lower; 0 unknown: only the projected normal tells.
+        sides: (V,) int8: +1 upper lip, -1 lower; 0 unknown: only the projected normal tells.
         rim: edges of the candidates where the mesh itself ends.
         outer_upper, outer_lower: edges of the border of the red; none where unknown.
     """
@@ -69,7 +69,7 @@ class LipSurface:
     @classmethod
     def of_regions(cls, regions: GuidedRegions) -> LipSurface:
         """The predicted triangles of any topology: no sides, no outer contour."""
-        nobody = np.zeros(len(regions.triangles), dtype=np.int8)
+        nobody = np.zeros(regions.n_vertices, dtype=np.int8)
         none = np.zeros((0, 2), dtype=np.int64)
         return cls._of(regions.triangles, regions.predicted, nobody, (none, none))
 
@@ -79,10 +79,7 @@ class LipSurface:
         sides = lip_sides(face, with_inside=True)
         of_lips = (sides != 0)[face.triangles].all(axis=1)
         of_lips[regions.predicted] = True
-        return cls._of(
-            face.triangles, np.flatnonzero(of_lips), triangle_sides(face.triangles, sides),
-            outer_halves(face),
-        )  # fmt: skip
+        return cls._of(face.triangles, np.flatnonzero(of_lips), sides, outer_halves(face))
 
     @classmethod
     def _of(
@@ -92,7 +89,7 @@ class LipSurface:
         sides: np.ndarray,
         outer: tuple[np.ndarray, np.ndarray],
     ) -> LipSurface:
-        touched = np.zeros(int(triangles.max()) + 1, dtype=bool)
+        touched = np.zeros(len(sides), dtype=bool)
         touched[triangles[candidates]] = True
         around = triangles[touched[triangles].any(axis=1)]
         ends = boundary_edges(triangles)
@@ -129,8 +126,17 @@ class Segments:
             self.start_depth[chosen], self.end_depth[chosen], self.normal[chosen],
         )  # fmt: skip
 
+    def shared_vertex(self, triangles: np.ndarray) -> np.ndarray:
+        """The corner from which both ends are reached along edges of triangles (T, 3), (S,) ids.
+
+        The start of a segment that is itself an edge.
+        """
+        corners, rows = self.start.corners(triangles), np.arange(len(self))
+        both = np.minimum(self.start.barycentric, self.end.barycentric)
+        return corners[rows, (both + 1e-9 * self.start.barycentric).argmax(axis=1)]
+
     def nearest(self, pixels: np.ndarray) -> tuple[SurfacePoints, np.ndarray]:
-        """The nearest point to the ray of each pixel (P, 2), P of them, and its distance (P,) px.
+        """The nearest point to the ray of pixels (P, 2), P of them, and its distance (P,) px.
 
         Raises ValueError where there is no segment.
         """
@@ -166,7 +172,7 @@ def inner_silhouettes(
     normals = normalised(_normals(vertices_mm, surface))
     segments = _zero_segments(vertices_mm, normals, surface, camera)
     projected = segments.normal @ camera.rotation[:2].T @ up
-    sides = surface.sides[segments.start.triangle]
+    sides = surface.sides[segments.shared_vertex(surface.triangles)]
     upper = (projected < 0) & (sides != LOWER)
     lower = (projected > 0) & (sides != UPPER)
     return segments[upper], segments[lower]
@@ -175,7 +181,11 @@ def inner_silhouettes(
 def outer_contours(
     vertices_mm: np.ndarray, surface: LipSurface, camera: Camera
 ) -> tuple[Segments, Segments]:
-    """(upper, lower) border of the red, which is a line of the mesh."""
+    """(upper, lower) border of the red, which is a line of the mesh.
+
+    Args:
+        vertices_mm: (V, 3), the camera's world.
+    """
     flat = np.zeros((len(vertices_mm), 3))
     upper, lower = (
         _edge_segments(vertices_mm, flat, edges, surface.triangles, camera)
@@ -272,12 +282,12 @@ def _seen(
 
 
 def _joined(a: Segments, b: Segments) -> Segments:
-    points = [
+    start, end = (
         SurfacePoints(
             np.concatenate([first.triangle, second.triangle]),
             np.concatenate([first.barycentric, second.barycentric]),
         )
         for first, second in ((a.start, b.start), (a.end, b.end))
-    ]
+    )
     names = ("start_px", "end_px", "start_depth", "end_depth", "normal")
-    return Segments(*points, *(np.concatenate([getattr(a, n), getattr(b, n)]) for n in names))
+    return Segments(start, end, *(np.concatenate([getattr(a, n), getattr(b, n)]) for n in names))
