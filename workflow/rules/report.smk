@@ -4,7 +4,7 @@
 def used_takes(role=None):
     """Takes that the database, the evaluation or the application needs."""
     wanted = {take.name for take in database_takes() + evaluated_takes()}
-    wanted |= {take.name for take in applied_takes()}
+    wanted |= {take.name for take in applied_takes() + guided_takes()}
     people = {name.split("/")[0] for name in wanted}
     wanted |= {take.name for take in takes("plain") if take.subject in people}
     return [take for take in takes(role) if take.name in wanted]
@@ -42,6 +42,8 @@ def quality_files():
         *of_takes(P.flow_quality, detail_takes()),
         *of_takes(P.relief_quality, relief_takes()),
         *of_takes(P.apply_quality, applied_takes()),
+        *of_frames(P.refined_quality, guided_takes()),
+        *of_takes(P.guided_quality, sketched_takes()),
     ]
 
 
@@ -59,6 +61,12 @@ def stage_overlays():
     shown.append(("detail", "", P.flow_overlay, detail_takes()))
     shown.append(("detail", ", relief", P.relief_overlay, relief_takes()))
     shown.append(("multiview", ", neutral", P.neutral_overlay, used_takes(("tattoo", "plain"))))
+    rows += [
+        ["guided", f"{take.name}, frame {int(frame)}", fill(P.refined_overlay, take, frame=frame)]
+        for take in guided_takes()
+        for frame in person_corrections(take)
+    ]
+    shown.append(("guided", "", P.guided_chunk_overlay, sketched_takes()))
     return rows + [
         [stage, take.name + what, of_chunks(pattern, take)[0]]
         for stage, what, pattern, rows_of_stage in shown

@@ -186,6 +186,13 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                     f"{origin}, key detail.{key}: found '{name}'; expected a take of the sheet of "
                     "role video or tattoo, written subject/take."
                 )
+    for name, sequence in configuration.guided.takes.items():
+        roles = ("tattoo",) if sequence == "H" else ("video", "tattoo")
+        if name not in by_name or by_name[name].role not in roles:
+            problems.append(
+                f"{origin}, key guided.takes: found '{name}' with the sequence {sequence}; expected a "
+                f"take of the sheet of role {' or '.join(roles)}, written subject/take."
+            )
     for name in configuration.landmarks.training_takes:
         if name not in by_name:
             problems.append(

@@ -15,6 +15,7 @@ from vermilion.config.detail import DetailConfig
 from vermilion.config.evaluation import EvaluationConfig
 from vermilion.config.face_model import FaceModelConfig
 from vermilion.config.features import FeaturesConfig
+from vermilion.config.guided import GuidedConfig
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.landmarks import LandmarksConfig
 from vermilion.config.multiview import MultiviewConfig
@@ -93,4 +94,8 @@ class Configuration(StageConfig):
     )
     apply: ApplyConfig = Field(
         default_factory=ApplyConfig, description="Correction of ordinary video (Lips16 6)."
+    )
+    guided: GuidedConfig = Field(
+        default_factory=GuidedConfig,
+        description="Correction of a take by a few frames that a person corrected (Guided18).",
     )
