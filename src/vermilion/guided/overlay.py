@@ -51,10 +51,10 @@ def draw_refinement(
     corner, scale = _window(np.concatenate([*seen, *strokes]))
     to_view = np.array([[scale, 0, -scale * corner[0]], [0, scale, -scale * corner[1]]])
     view = cv2.warpAffine(image, to_view, (_SIDE_PX, _SIDE_PX), flags=cv2.INTER_LINEAR)
+    for points in strokes:
+        view = draw_points(view, (points - corner) * scale, STROKE, 3)
     for group, colour in zip(contours, (BEFORE, AFTER), strict=True):
         view = _draw_segments(view, group, corner, scale, colour)
-    for points in strokes:
-        view = draw_points(view, (points - corner) * scale, STROKE)
     return label(view, "stroke yellow, before red, after green")
 
 
