@@ -31,7 +31,9 @@ class Propagation:
     Attributes:
         vertices_mm: (F, V, 3) float64, in the frame of the input.
         unexplained: (F,) share of the mouth region's deformation that no training frame spans, in
-            [0, 1]: the higher, the more a frame needs a correction of its own.
+            [0, 1]: the higher, the more a frame needs a correction of its own. Of a frame that is
+            deformed less than the corrected ones in the mean, it is the share of that mean: a mouth
+            at rest needs none.
         depth_mm: (F,) how deep one lip lies in the other; 0 without contact.
     """
 
@@ -52,6 +54,7 @@ class LipPropagator:
         stable: (s,) vertices that hold the alignment.
         base: whether the regression predicts the change of the base's lips (True) or the lips
             themselves (False, the paper).
+        scale: mean length of the corrected frames' trusted gradients less the neutral's.
         regression: fitted by `fit`.
     """
 
@@ -85,7 +88,7 @@ class LipPropagator:
         self._predicted = NeutralTriangles(rest, local.triangles[local.predicted])
         self._neutral_y = self._trusted.gradients(rest[None])
         self._energy = ConstrainedEnergy(self.integrator.factor, regions.free, regions.n_vertices)
-        self.base = False
+        self.base, self.scale = False, 0.0
         self.regression: ReducedRegression | None = None
 
     def fit(
@@ -117,6 +120,7 @@ class LipPropagator:
             self._check_meshes(base_mm, "base frames")
             aligned = move_frames(base_mm[:, self._mouth], *motions)
         y = self._trusted.gradients(aligned)
+        self.scale = float(np.linalg.norm(y - self._neutral_y, axis=1).mean())
         if self.base:
             x = x - self._predicted.gradients(aligned)
         if with_neutral:
@@ -147,7 +151,9 @@ class LipPropagator:
             part = slice(first, first + _BLOCK)
             aligned, (rotations, translations_mm) = self._aligned(result[part])
             y = self._trusted.gradients(aligned)
-            unexplained[part] = self.regression.unexplained(y, self._neutral_y[0])
+            deformation = np.linalg.norm(y - self._neutral_y, axis=1)
+            share = self.regression.unexplained(y, self._neutral_y[0])
+            unexplained[part] = share * deformation / np.maximum(deformation, self.scale)
             x = self.regression.predict(y)
             if self.base:
                 x += self._predicted.gradients(aligned)
@@ -169,6 +175,7 @@ class LipPropagator:
             "stable": self.stable,
             "follow_mm": np.float64(self.follow_mm),
             "base": np.bool_(self.base),
+            "scale": np.float64(self.scale),
             **self.regions.arrays(),
             **self.regression.arrays(),
         }
@@ -186,7 +193,16 @@ class LipPropagator:
                 "Train it again with this version of Vermilion.",
                 path=path,
             )
-        names = ("neutral_mm", "stable", "follow_mm", "base", "triangles", "predicted", "trusted")
+        names = (
+            "neutral_mm",
+            "stable",
+            "follow_mm",
+            "base",
+            "scale",
+            "triangles",
+            "predicted",
+            "trusted",
+        )
         missing = [name for name in names if name not in arrays]
         if missing:
             raise ModelFileError(
@@ -195,7 +211,7 @@ class LipPropagator:
             )  # fmt: skip
         regions = GuidedRegions.from_arrays(arrays)
         result = cls(arrays["neutral_mm"], regions, arrays["stable"], float(arrays["follow_mm"]))
-        result.base = bool(arrays["base"])
+        result.base, result.scale = bool(arrays["base"]), float(arrays["scale"])
         result.regression = ReducedRegression.from_arrays(arrays, str(path))
         return result
 
