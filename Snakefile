@@ -63,6 +63,12 @@ rule guided:
         guided_outputs(),
 
 
+rule guided_evaluation:
+    """Error of guided correction against the number of frames, for the takes of `guided.study`."""
+    input:
+        of_takes(P.guided_measures, studied_takes()),
+
+
 rule regressors:
     """Every regressor of Lips16 section 6: PS, MS, GR."""
     input:

@@ -29,17 +29,15 @@ from benchmarks.common import add_data_argument
 from benchmarks.guided_actors import N_FRAMES, actor_take
 from benchmarks.guided_speed import speed
 from vermilion.correction.lip_crossings import LipCrossings
+from vermilion.evaluation.guided_study import PropagationStudy
 from vermilion.faces import ict
 from vermilion.faces.ict_archive import read_ict
 from vermilion.faces.model import FaceModel
 from vermilion.faces.procedural import studio_model
 from vermilion.guided.contact import LipVolumes
-from vermilion.guided.gradients import NeutralTriangles
-from vermilion.guided.propagation import LipPropagator
 from vermilion.guided.regions import regions_of_face
 from vermilion.guided.suggestion import (
     extreme_frames,
-    mouth_deformation,
     random_frames,
     suggest_frames,
     uniform_frames,
@@ -54,27 +52,16 @@ class Trial:
     """One actor's take: propagation from any chosen frames, and what it leaves."""
 
     def __init__(self, face: FaceModel, weights: np.ndarray, seed: int, **sizes: float):
-        self.face = face
         self.neutral, self.take = actor_take(face, weights, seed)
         self.regions = regions_of_face(face, **sizes)
-        self.stable = np.flatnonzero(face.regions["rigid"])
-        self.propagator = LipPropagator(self.neutral, self.regions, self.stable)
-        self.deformation = mouth_deformation(self.take, self.neutral, self.regions, self.stable)
-        free = self.regions.free
-        self.size = np.linalg.norm(self.take[:, free] - self.neutral[free], axis=2).mean(axis=1)
+        stable = np.flatnonzero(face.regions["rigid"])
+        self.study = PropagationStudy(self.take, self.neutral, self.regions, stable)
+        self.deformation, self.size = self.study.deformation, self.study.size_mm
 
     def left(self, frames: np.ndarray, **options) -> tuple[float, float, np.ndarray]:
         """(share left of the deformation, mean |x* - x|, meshes) of all frames but those trained."""
-        self.propagator.fit(self.take[frames], **options)
-        found = self.propagator.correct(self.take).vertices_mm
-        free, others = self.regions.free, np.setdiff1d(np.arange(len(self.take)), frames)
-        error = np.linalg.norm(found[:, free] - self.take[:, free], axis=2).mean(axis=1)
-        share = error[others].mean() / self.size[others].mean()
-        inside = NeutralTriangles(self.neutral, self.regions.triangles[self.regions.predicted])
-        gradient = np.linalg.norm(
-            inside.gradients(found[others]) - inside.gradients(self.take[others]), axis=1
-        )
-        return share, gradient.mean(), found
+        left = self.study.left(frames, **options)
+        return self.study.ratio(left), left.gradient_error[left.others].mean(), left.vertices_mm
 
 
 def study(face: FaceModel, takes: dict[str, np.ndarray], actors: int, draws: int) -> None:
@@ -127,12 +114,12 @@ def lips(face: FaceModel, weights: np.ndarray) -> None:
         off = 100 * np.abs(volumes.measure(found) / rest - true).max(axis=1)
         print(f"{k:3d} {100 * share:8.1f} {gradient:10.2f} {off.mean():10.2f} {off.max():6.2f}")
     frames = suggest_frames(trial.deformation, 10)
-    trial.propagator.fit(trial.take[frames])
+    trial.study.propagator.fit(trial.take[frames])
     every = np.arange(0, len(trial.take), 3)
     for label, lip in (("truth", None), ("propagated", None), ("and parted", crossings)):
         meshes = trial.take[every]
         if label != "truth":
-            meshes = trial.propagator.correct(meshes, lip).vertices_mm
+            meshes = trial.study.propagator.correct(meshes, lip).vertices_mm
         depth = np.array([crossings.find(mesh).deepest_mm for mesh in meshes])
         off = 100 * np.abs(volumes.measure(meshes) / rest - true[every]).max(axis=1)
         print(f"lips through each other, {label:11s} {(depth > 0.05).sum():3d} of {len(depth)} frames, "

@@ -160,6 +160,8 @@ class P:
     estimators = _EVALUATION + "/estimators.tsv"
     figure16 = _EVALUATION + "/figure16.png"
     ablations = _EVALUATION + "/ablations.tsv"
+    guided_measures = _EVALUATION + "/guided/{subject}/{take}/measures.tsv"
+    guided_figure = _EVALUATION + "/guided/{subject}/{take}/figure11.png"
 
     # apply
     applied = _APPLY

@@ -91,6 +91,28 @@ class SuggestionConfig(StageConfig):
     count: int = Field(10, ge=1, le=1000, description="Frames to suggest, best first (count).")
 
 
+class GuidedStudyConfig(StageConfig):
+    """Error against the number of corrected frames (Guided18 6.2)."""
+
+    takes: list[str] = Field(
+        default_factory=list,
+        description="Takes (subject/take) whose true frames train and predict each other: takes of the "
+        "studio by their truth, other takes of role tattoo by **H**; none by default.",
+    )
+    counts: list[int] = Field(
+        [1, 2, 3, 5, 8, 10], min_length=1, description="Numbers of corrected frames (count)."
+    )
+    choices: list[Literal["suggested", "uniform", "extremes", "random"]] = Field(
+        ["suggested", "uniform", "extremes", "random"],
+        min_length=1,
+        description="How the corrected frames are chosen.",
+    )
+    draws: int = Field(
+        20, ge=1, le=10_000, description="Random choices, whose median is the value (count)."
+    )
+    seed: int = Field(0, ge=0, description="Seed of the random choices.")
+
+
 class GuidedConfig(StageConfig):
     """Correction of a take by a few frames that a person corrected."""
 
@@ -113,4 +135,8 @@ class GuidedConfig(StageConfig):
     )
     suggestion: SuggestionConfig = Field(
         default_factory=SuggestionConfig, description="Frames worth correcting."
+    )
+    study: GuidedStudyConfig = Field(
+        default_factory=GuidedStudyConfig,
+        description="Error against the number of corrected frames (Guided18 6.2).",
     )

@@ -193,6 +193,13 @@ def _cross_checks(configuration: Configuration, takes: list[Take], origin: str) 
                 f"{origin}, key guided.takes: found '{name}' with the sequence {sequence}; expected a "
                 f"take of the sheet of role {' or '.join(roles)}, written subject/take."
             )
+    for name in configuration.guided.study.takes:
+        take = by_name.get(name)
+        if take is None or not (take.source == STUDIO or take.role == "tattoo"):
+            problems.append(
+                f"{origin}, key guided.study.takes: found '{name}'; expected a take of the sheet that "
+                "the studio makes, or of role tattoo, written subject/take."
+            )
     for name in configuration.landmarks.training_takes:
         if name not in by_name:
             problems.append(

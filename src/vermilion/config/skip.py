@@ -29,7 +29,10 @@ def without_skipped(
         "correction": configuration.correction.model_copy(update={"neutral_frames": neutral}),
         "detail": detail.model_copy(update={"takes": kept(detail.takes), "relief": relief}),
         "guided": guided.model_copy(
-            update={"takes": {n: s for n, s in guided.takes.items() if n not in skipped}}
+            update={
+                "takes": {n: s for n, s in guided.takes.items() if n not in skipped},
+                "study": guided.study.model_copy(update={"takes": kept(guided.study.takes)}),
+            }
         ),
         "landmarks": configuration.landmarks.model_copy(
             update={"training_takes": kept(configuration.landmarks.training_takes)}
