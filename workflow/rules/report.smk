@@ -66,6 +66,10 @@ def stage_overlays():
         for take in guided_takes()
         for frame in person_corrections(take)
     ]
+    rows += [
+        ["guided", f"{take.name}, figure 11", fill(P.guided_figure, take)]
+        for take in studied_takes()
+    ]
     shown.append(("guided", "", P.guided_chunk_overlay, sketched_takes()))
     return rows + [
         [stage, take.name + what, of_chunks(pattern, take)[0]]
@@ -156,8 +160,10 @@ rule summary:
         reconstructions=of_takes(P.multiview_page, used_takes("tattoo")),
         training=expand(P.validation_curve, regressor=regressor_names()),
         overlays=[path for _, _, path in stage_overlays()],
-        videos=of_takes(P.apply_overlay, applied_takes()),
-        timelines=of_takes(P.timeline, applied_takes()),
+        videos=of_takes(P.apply_overlay, applied_takes())
+        + of_takes(P.guided_overlay, sketched_takes()),
+        timelines=of_takes(P.timeline, applied_takes())
+        + of_takes(P.guided_timeline, sketched_takes()),
     output:
         page=report(
             P.summary,
@@ -191,7 +197,8 @@ rule summary:
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),
             "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
-            "videos": [take.name for take in applied_takes()],
+            "videos": [take.name for take in applied_takes()]
+            + [f"{take.name}, guided" for take in sketched_takes()],
             "reconstructions": [take.name for take in used_takes("tattoo")],
         },
         regressors=regressor_rows(),
