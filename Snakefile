@@ -27,6 +27,7 @@ include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/apply.smk"
+include: "workflow/rules/guided.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/targets.smk"
 
@@ -54,6 +55,18 @@ rule detail:
     """The finer sequences of `detail.takes` and `detail.relief.takes` (Mono13 sections 7, 8)."""
     input:
         detail_outputs(),
+
+
+rule guided:
+    """The takes of `guided.takes`: suggested frames; where some are corrected, the whole take."""
+    input:
+        guided_outputs(),
+
+
+rule guided_evaluation:
+    """Error of guided correction against the number of frames, for the takes of `guided.study`."""
+    input:
+        of_takes(P.guided_measures, studied_takes()),
 
 
 rule regressors:

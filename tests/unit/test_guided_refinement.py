@@ -5,16 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import sparse
-from vermilion.geometry.mesh_points import MeshPoints
 
 from tests.unit import guided_mouths as mouths
-from vermilion.correction.constraints import Rows
+from vermilion.correction.constraints import LinearConstraints
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
 from vermilion.geometry.sparse import CholeskyFactor
-from vermilion.guided.refinement import SMOOTH, RefinementSettings, SketchRefiner, View, ray_rows
-from vermilion.guided.row_solver import RowSolver
+from vermilion.guided.constrained_energy import ConstrainedEnergy
+from vermilion.guided.refinement import (
+    SMOOTH,
+    RefinementSettings,
+    SketchRefiner,
+    View,
+    ray_constraints,
+)
 from vermilion.guided.silhouette import LipSurface, inner_silhouettes
 from vermilion.guided.sketch import Sketch, SketchCurve
 from vermilion.storage.errors import InputError
@@ -155,9 +160,9 @@ def test_silhouettes_turn_away_from_the_view(base):
     for segments, sign in zip(
         inner_silhouettes(base, mouths.surface(), camera, mouths.UP), (1.0, -1.0), strict=True
     ):
-        rays = segments.start.of(base) - camera.centre_mm
+        rays = segments.start.sample(base, mouths.face().triangles) - camera.centre_mm
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        normal = segments.start.of(normals)
+        normal = segments.start.sample(normals, mouths.face().triangles)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         assert len(segments) > 30
         assert np.median(np.abs((rays * normal).sum(axis=1))) < 0.02
@@ -171,8 +176,10 @@ def test_the_nearest_point_of_a_segment_lies_between_its_vertices(base):
     middles = 0.5 * (upper.start_px + upper.end_px)
     points, distance = upper.nearest(middles)
     assert distance.max() < 1e-9
-    np.testing.assert_allclose(camera.project(points.of(base)), middles, atol=1e-6)
-    np.testing.assert_allclose(points.weights.sum(axis=1), 1.0)
+    np.testing.assert_allclose(
+        camera.project(points.sample(base, mouths.face().triangles)), middles, atol=1e-6
+    )
+    np.testing.assert_allclose(points.barycentric.sum(axis=1), 1.0)
 
 
 def test_sides_need_no_face_model(base, true):
@@ -182,21 +189,21 @@ def test_sides_need_no_face_model(base, true):
     assert result.mean_px < 0.5
 
 
-def test_a_ray_row_measures_the_distance_to_the_ray():
+def test_ray_constraints_measure_the_distance_to_the_ray():
     camera = mouths.camera()
     point = camera.centre_mm + 500.0 * -camera.rotation.T @ np.array([0.1, 0.05, -1.0])
-    points = MeshPoints(np.array([[0, 1]]), np.array([[0.5, 0.5]]))
-    mesh = np.stack([point - 1.0, point + 1.0])
     pixel = camera.project(point[None]) + np.array([3.0, -4.0])
-    rows = ray_rows(points, mesh, camera, pixel, 2.0)
+    made = ray_constraints(
+        np.array([[0, 1]]), np.array([[0.5, 0.5]]), point[None], camera, pixel, 2.0
+    )
     origin, ray = camera.rays(pixel)
     offset = point - origin[0]
     expected = np.linalg.norm(offset - (offset @ ray[0]) * ray[0])
-    assert np.linalg.norm(rows.wanted) == pytest.approx(expected, rel=1e-9)
-    assert np.abs(rows.directions @ ray[0]).max() < 1e-12
+    assert np.linalg.norm(made.target_mm) == pytest.approx(expected, rel=1e-9)
+    assert np.abs(made.directions @ ray[0]).max() < 1e-12
 
 
-def test_the_row_solver_finds_the_least_squares_minimum():
+def test_the_constrained_energy_has_the_least_squares_minimum():
     rng = np.random.default_rng(0)
     root = rng.normal(size=(30, 12))
     matrix = root.T @ root + np.eye(12)
@@ -205,9 +212,11 @@ def test_the_row_solver_finds_the_least_squares_minimum():
     directions = rng.normal(size=(6, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     wanted, weight = rng.normal(size=6), rng.uniform(0.5, 2.0, 6)
-    rows = Rows(ids, coefficients, directions, wanted, 1 / weight, np.zeros(6, dtype=bool))
-    solver = RowSolver(CholeskyFactor(sparse.csc_matrix(matrix)), free, 20)
-    found = solver.solve(rows)
+    constraints = LinearConstraints(
+        ids, coefficients, directions, wanted, 1 / weight, np.zeros(6, dtype=bool)
+    )
+    energy = ConstrainedEnergy(CholeskyFactor(sparse.csc_matrix(matrix)), free, 20)
+    found = energy.minimise(constraints)
     # The same energy, dense: x^T A x + sum w (J x - r)^2 over all 36 unknowns.
     jacobian = np.zeros((6, 20, 3))
     for i in range(6):

@@ -19,23 +19,19 @@ def apply_neutral(wildcards):
     return {"neutral_pair": neutral_pair_of(wildcards.subject), **neutral_of_take(wildcards)}
 
 
-def apply_exports():
-    """Outputs of a corrected take; USD and OBJ as the configuration asks."""
+def exports_to(folder, overlay, timeline, category):
+    """Outputs of a corrected take in a folder; USD and OBJ as the configuration asks."""
     outputs = {
-        "corrected": P.applied + "/corrected.npy",
-        "mesh": P.applied + "/mesh.ply",
-        "weights": P.applied + "/weights.csv",
-        "overlay": in_report(
-            P.apply_overlay, "Corrected takes", "overlay", take="{subject}/{take}"
-        ),
-        "timeline": in_report(
-            P.timeline, "Corrected takes", "timeline", take="{subject}/{take}, time line"
-        ),
+        "corrected": folder + "/corrected.npy",
+        "mesh": folder + "/mesh.ply",
+        "weights": folder + "/weights.csv",
+        "overlay": in_report(overlay, category, "overlay", take="{subject}/{take}"),
+        "timeline": in_report(timeline, category, "timeline", take="{subject}/{take}, time line"),
     }
     if CONFIG.apply.export.usd:
-        outputs["usd"] = P.applied + "/corrected.usdc"
+        outputs["usd"] = folder + "/corrected.usdc"
     if CONFIG.apply.export.obj:
-        outputs["obj"] = directory(P.applied + "/obj")
+        outputs["obj"] = directory(folder + "/obj")
     return outputs
 
 
@@ -98,7 +94,7 @@ rule apply_export:
         overlays=per_chunk(P.apply_clip),
         quality=per_chunk(P.apply_quality),
     output:
-        **apply_exports(),
+        **exports_to(P.applied, P.apply_overlay, P.timeline, "Corrected takes"),
     log:
         P.log("apply_export", "take"),
     benchmark:

@@ -48,6 +48,7 @@ wildcard_constraints:
     subject=r"[A-Za-z0-9_.]+",
     take=r"[A-Za-z0-9_.]+",
     chunk=r"\d{6}-\d{6}",
+    frame=r"\d{6}",
     regressor=r"[A-Za-z0-9_.\-]+",
 
 

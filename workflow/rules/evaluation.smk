@@ -186,6 +186,55 @@ rule evaluate_reconstruction:
         "../scripts/evaluation/evaluate_reconstruction.py"
 
 
+def studied_takes():
+    """Rows of the takes whose true frames train and predict each other (Guided18 6.2)."""
+    return [_TAKES[name] for name in CONFIG.guided.study.takes]
+
+
+def studied_truth(wildcards):
+    """The true sequence of a take with its face model and neutral: the studio's, else H."""
+    take = take_of(wildcards)
+    if take.source == STUDIO:
+        truth = fill(P.truth, take)
+        return {
+            "sequence": [truth + "/vertices_mm.npy"],
+            "neutral": truth + "/neutral_mm.npy",
+            "face": P.studio_model,
+        }
+    return {
+        "sequence": of_chunks(P.accurate, take),
+        "neutral": fill(P.neutral, take),
+        "face": P.template,
+    }
+
+
+rule guided_evaluate:
+    """Trains guided correction with few true frames, predicts all others (Guided18 6.2, figure 11)."""
+    input:
+        unpack(studied_truth),
+    output:
+        measures=P.guided_measures,
+        figure=report(
+            P.guided_figure,
+            category="Errors",
+            subcategory="Guided correction",
+            labels={"take": "{subject}/{take}"},
+            caption="../report/figure11.rst",
+        ),
+    log:
+        P.log("guided_evaluate", "take"),
+    benchmark:
+        P.benchmark("guided_evaluate", "take")
+    resources:
+        mem_mb=4000,
+        runtime=120,
+    params:
+        cfg=cfg_of("guided.regions", "guided.study", "evaluation.measures"),
+        code=code_of("evaluation/guided_evaluate"),
+    script:
+        "../scripts/evaluation/guided_evaluate.py"
+
+
 rule evaluation_figures:
     """Renders, surface stretch and errors from front and side, curves over time (fig. 9 to 16)."""
     input:
@@ -246,7 +295,8 @@ rule measures:
         reconstructions=of_takes(P.reconstructed + "/sums.npz", reconstructed_takes()),
         curves=[path.replace(".h5", ".cv.tsv") for path in all_evaluated_models()],
         tables=of_takes(P.evaluated + "/measures.tsv", evaluated_takes())
-        + of_takes(P.reconstructed + "/measures.tsv", reconstructed_takes()),
+        + of_takes(P.reconstructed + "/measures.tsv", reconstructed_takes())
+        + of_takes(P.guided_measures, studied_takes()),
     output:
         measures=in_report(P.measures, "Tables", "measures", table="all measures"),
         kinds=in_report(P.kinds, "Tables", "kinds", table="kinds of mouth shapes"),

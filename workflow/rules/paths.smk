@@ -17,6 +17,7 @@ _JOBS = {
     "take": "/{subject}-{take}",
     "chunk": "/{subject}-{take}-{chunk}",
     "clip": "/{subject}-{take}-{clip}",
+    "frame": "/{subject}-{take}-{frame}",
     "regressor": "/{regressor}",
 }
 
@@ -159,6 +160,8 @@ class P:
     estimators = _EVALUATION + "/estimators.tsv"
     figure16 = _EVALUATION + "/figure16.png"
     ablations = _EVALUATION + "/ablations.tsv"
+    guided_measures = _EVALUATION + "/guided/{subject}/{take}/measures.tsv"
+    guided_figure = _EVALUATION + "/guided/{subject}/{take}/figure11.png"
 
     # apply
     applied = _APPLY
@@ -169,6 +172,20 @@ class P:
     timeline = _APPLY + "/timeline.png"
     makeup = _APPLY + "/makeup.mp4"
     makeup_chunk = _APPLY + "/makeup/{chunk}"
+
+    # guided
+    guided = _TAKE + "/guided"
+    refined = _TAKE + "/guided/refined/{frame}.npz"
+    refined_quality = _TAKE + "/guided/quality/refined/{frame}.tsv"
+    refined_overlay = _TAKE + "/guided/overlay/refined/{frame}.png"
+    lip_propagator = _TAKE + "/guided/propagator.npz"
+    suggestions = _TAKE + "/guided/suggestions.tsv"
+    guided_chunk = _TAKE + "/guided/chunks/{chunk}.npy"
+    guided_clip = _TAKE + "/guided/chunks/{chunk}.mp4"
+    guided_quality = _TAKE + "/guided/quality/{chunk}.tsv"
+    guided_chunk_overlay = _TAKE + "/guided/overlay/{chunk}.png"
+    guided_overlay = _TAKE + "/guided/overlay.mp4"
+    guided_timeline = _TAKE + "/guided/timeline.png"
 
     # report
     quality = R + "/quality.tsv"

@@ -4,7 +4,7 @@
 def used_takes(role=None):
     """Takes that the database, the evaluation or the application needs."""
     wanted = {take.name for take in database_takes() + evaluated_takes()}
-    wanted |= {take.name for take in applied_takes()}
+    wanted |= {take.name for take in applied_takes() + guided_takes()}
     people = {name.split("/")[0] for name in wanted}
     wanted |= {take.name for take in takes("plain") if take.subject in people}
     return [take for take in takes(role) if take.name in wanted]
@@ -42,6 +42,8 @@ def quality_files():
         *of_takes(P.flow_quality, detail_takes()),
         *of_takes(P.relief_quality, relief_takes()),
         *of_takes(P.apply_quality, applied_takes()),
+        *of_frames(P.refined_quality, guided_takes()),
+        *of_takes(P.guided_quality, sketched_takes()),
     ]
 
 
@@ -59,6 +61,16 @@ def stage_overlays():
     shown.append(("detail", "", P.flow_overlay, detail_takes()))
     shown.append(("detail", ", relief", P.relief_overlay, relief_takes()))
     shown.append(("multiview", ", neutral", P.neutral_overlay, used_takes(("tattoo", "plain"))))
+    rows += [
+        ["guided", f"{take.name}, frame {int(frame)}", fill(P.refined_overlay, take, frame=frame)]
+        for take in guided_takes()
+        for frame in person_corrections(take)
+    ]
+    rows += [
+        ["guided", f"{take.name}, figure 11", fill(P.guided_figure, take)]
+        for take in studied_takes()
+    ]
+    shown.append(("guided", "", P.guided_chunk_overlay, sketched_takes()))
     return rows + [
         [stage, take.name + what, of_chunks(pattern, take)[0]]
         for stage, what, pattern, rows_of_stage in shown
@@ -143,8 +155,10 @@ rule summary:
         reconstructions=of_takes(P.multiview_page, used_takes("tattoo")),
         training=expand(P.validation_curve, regressor=regressor_names()),
         overlays=[path for _, _, path in stage_overlays()],
-        videos=of_takes(P.apply_overlay, applied_takes()),
-        timelines=of_takes(P.timeline, applied_takes()),
+        videos=of_takes(P.apply_overlay, applied_takes())
+        + of_takes(P.guided_overlay, sketched_takes()),
+        timelines=of_takes(P.timeline, applied_takes())
+        + of_takes(P.guided_timeline, sketched_takes()),
     output:
         page=in_report(P.summary, "Summary", "summary", page="summary"),
     log:
@@ -173,7 +187,8 @@ rule summary:
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),
             "overlays": [[stage, what] for stage, what, _ in stage_overlays()],
-            "videos": [take.name for take in applied_takes()],
+            "videos": [take.name for take in applied_takes()]
+            + [f"{take.name}, guided" for take in sketched_takes()],
             "reconstructions": [take.name for take in used_takes("tattoo")],
         },
         regressors=regressor_rows(),

@@ -81,6 +81,8 @@ def all_outputs():
         P.measures,
         *of_takes(P.apply_overlay, applied_takes()),
         *of_takes(P.corrected, applied_takes()),
+        *guided_outputs(),
+        *of_takes(P.guided_measures, studied_takes()),
         *(of_takes(P.makeup, applied_takes()) if CONFIG.apply.makeup.enabled else []),
         *([P.ablations] if ablation_tables() else []),
         P.quality,

@@ -22,6 +22,7 @@ def cross_checks(configuration: Configuration, takes: list[Take]) -> Iterator[st
     detail = configuration.detail
     yield from _detailed("detail.takes", detail.takes, by_name)
     yield from _detailed("detail.relief.takes", detail.relief.takes, by_name)
+    yield from _guided(configuration, by_name)
     for name in configuration.landmarks.training_takes:
         if name not in by_name:
             yield (
@@ -99,4 +100,21 @@ def _detailed(key: str, names: Iterable[str], by_name: dict[str, Take]) -> Itera
             yield (
                 f"{key}: found '{name}'; expected a take of the sheet of role video or tattoo, "
                 "written subject/take."
+            )
+
+
+def _guided(configuration: Configuration, by_name: dict[str, Take]) -> Iterator[str]:
+    for name, sequence in configuration.guided.takes.items():
+        roles = ("tattoo",) if sequence == "H" else IMAGE_ROLES
+        if name not in by_name or by_name[name].role not in roles:
+            yield (
+                f"guided.takes: found '{name}' with the sequence {sequence}; expected a take of the "
+                f"sheet of role {' or '.join(roles)}, written subject/take."
+            )
+    for name in configuration.guided.study.takes:
+        take = by_name.get(name)
+        if take is None or not (take.source == STUDIO or take.role == "tattoo"):
+            yield (
+                f"guided.study.takes: found '{name}'; expected a take of the sheet that the studio "
+                "makes, or of role tattoo, written subject/take."
             )

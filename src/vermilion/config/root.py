@@ -15,6 +15,7 @@ from vermilion.config.detail import DetailConfig
 from vermilion.config.evaluation import EvaluationConfig
 from vermilion.config.face_model import FaceModelConfig
 from vermilion.config.features import FeaturesConfig
+from vermilion.config.guided import GuidedConfig
 from vermilion.config.inpaint import InpaintConfig
 from vermilion.config.landmarks import LandmarksConfig
 from vermilion.config.multiview import MultiviewConfig
@@ -69,3 +70,6 @@ class Configuration(StageConfig):
     training: TrainingConfig = section(TrainingConfig, "Regressors (Lips16 5.2).")
     evaluation: EvaluationConfig = section(EvaluationConfig, "Measures and report (Lips16 6).")
     apply: ApplyConfig = section(ApplyConfig, "Correction of ordinary video (Lips16 6).")
+    guided: GuidedConfig = section(
+        GuidedConfig, "Correction of a take by a few frames that a person corrected (Guided18)."
+    )

@@ -22,12 +22,18 @@ def without_skipped(
         for name, frame in configuration.correction.neutral_frames.items()
         if name not in skipped
     }
-    detail = configuration.detail
+    detail, guided = configuration.detail, configuration.guided
     relief = detail.relief.model_copy(update={"takes": kept(detail.relief.takes)})
     sections = {
         "apply": configuration.apply.model_copy(update={"takes": kept(configuration.apply.takes)}),
         "correction": configuration.correction.model_copy(update={"neutral_frames": neutral}),
         "detail": detail.model_copy(update={"takes": kept(detail.takes), "relief": relief}),
+        "guided": guided.model_copy(
+            update={
+                "takes": {n: s for n, s in guided.takes.items() if n not in skipped},
+                "study": guided.study.model_copy(update={"takes": kept(guided.study.takes)}),
+            }
+        ),
         "landmarks": configuration.landmarks.model_copy(
             update={"training_takes": kept(configuration.landmarks.training_takes)}
         ),

@@ -19,6 +19,10 @@ from scipy import sparse
 
 from vermilion.correction.integration import LayerIntegrator
 
+_ROUNDS = 10
+#: Keeps the system definite where exact constraints repeat each other.
+_LEAST_COMPLIANCE = 1e-9
+
 
 @dataclass(frozen=True)
 class LinearConstraints:
@@ -92,22 +96,9 @@ class ConstraintSolver:
 
     def forces(self, constraints: LinearConstraints) -> np.ndarray:
         """Forces l (m,) along the constraints; 0 where a one-sided one would have to pull back."""
-        result = np.zeros(len(constraints))
         if len(constraints) == 0:
-            return result
-        system = self.response(constraints, constraints)
-        system += np.diag(constraints.compliance + 1e-9)
-        active = np.ones(len(constraints), dtype=bool)
-        for _ in range(10):
-            result[:] = 0.0
-            result[active] = np.linalg.solve(
-                system[np.ix_(active, active)], constraints.target_mm[active]
-            )
-            pulling = active & constraints.one_sided & (result < 0)
-            if not pulling.any():
-                break
-            active &= ~pulling
-        return np.where(constraints.one_sided, np.maximum(result, 0.0), result)
+            return np.zeros(0)
+        return one_sided_forces(self.response(constraints, constraints), constraints)
 
     def response(self, of: LinearConstraints, to: LinearConstraints) -> np.ndarray:
         """(m, m'): what `of` measures when each force of `to` is one."""
@@ -133,8 +124,39 @@ class ConstraintSolver:
 
     def _shares(self, constraints: LinearConstraints) -> sparse.csr_matrix:
         """(m, K + 1): each constraint's coefficients at the named vertices."""
-        count, width = constraints.vertices.shape
-        starts = np.arange(0, count * width + 1, width)
-        at = self._place[constraints.vertices].ravel()
-        shape = (count, len(self._inverse))
-        return sparse.csr_matrix((constraints.coefficients.ravel(), at, starts), shape=shape)
+        return shares_of_vertices(constraints, self._place, len(self._inverse))
+
+
+def one_sided_forces(response: np.ndarray, constraints: LinearConstraints) -> np.ndarray:
+    """Forces (m,) along constraints; 0 where a one-sided one would have to pull back.
+
+    Args:
+        response: (m, m), what each constraint measures when the force of another is one.
+        constraints: m.
+    """
+    system = response + np.diag(constraints.compliance + _LEAST_COMPLIANCE)
+    result, active = np.zeros(len(constraints)), np.ones(len(constraints), dtype=bool)
+    for _ in range(_ROUNDS):
+        result[:] = 0.0
+        result[active] = np.linalg.solve(
+            system[np.ix_(active, active)], constraints.target_mm[active]
+        )
+        pulling = active & constraints.one_sided & (result < 0)
+        if not pulling.any():
+            break
+        active &= ~pulling
+    return np.where(constraints.one_sided, np.maximum(result, 0.0), result)
+
+
+def shares_of_vertices(
+    constraints: LinearConstraints, place: np.ndarray, count: int
+) -> sparse.csr_matrix:
+    """Each constraint's coefficients at places of vertices, (m, count).
+
+    Args:
+        place: (V,) place of each vertex, from 0 to count - 1.
+    """
+    rows, width = constraints.vertices.shape
+    starts = np.arange(0, rows * width + 1, width)
+    at = place[constraints.vertices].ravel()
+    return sparse.csr_matrix((constraints.coefficients.ravel(), at, starts), shape=(rows, count))

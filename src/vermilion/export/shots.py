@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,9 +68,21 @@ def framing(
     width = face.size[0]
     strip = (width, 2 * round(width * _STRIP_HEIGHT / 2))
     strips = strips_following(projected(np.flatnonzero(lips)), 0.9, strip)
+    return Framing(face, strips, *_surface(model))
+
+
+def with_surface_of(view: Framing, model: FaceModel) -> Framing:
+    """The same crops for meshes of another model's topology."""
+    triangles, colours = _surface(model)
+    return replace(view, triangles=triangles, colours=colours)
+
+
+def _surface(model: FaceModel) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (T, 3) to draw and colours (V, 3) of a model."""
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
     shown = model.regions["face"] | model.regions["mouth_inner"] | lips
     triangles = model.triangles[shown[model.triangles].all(axis=1)]
-    return Framing(face, strips, triangles, lip_colours(model.triangles, lips))
+    return triangles, lip_colours(model.triangles, lips)
 
 
 def overlay_frames(

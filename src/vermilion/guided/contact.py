@@ -9,19 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.correction.lip_constraints import SLACK_MM, parting_rows
+from vermilion.correction.lip_constraints import SLACK_MM, separation_constraints
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import boundary_edges
-from vermilion.guided.row_solver import RowSolver
+from vermilion.guided.constrained_energy import ConstrainedEnergy
 
 _ROUNDS = 8
 
 
 @dataclass(frozen=True)
-class Parted:
-    """A mesh whose lips were parted.
+class SeparatedLips:
+    """A mesh whose lips were separated.
 
     Attributes:
         vertices_mm: (V, 3).
@@ -33,29 +33,35 @@ class Parted:
     after_mm: float
 
 
-def part_lips(
-    vertices_mm: np.ndarray, crossings: LipCrossings, solver: RowSolver, rounds: int = _ROUNDS
-) -> Parted:
-    """Move the solver's free vertices least, in its energy, so that no lip lies in the other.
+def separate_lips(
+    vertices_mm: np.ndarray,
+    crossings: LipCrossings,
+    energy: ConstrainedEnergy,
+    rounds: int = _ROUNDS,
+) -> SeparatedLips:
+    """Move the energy's free vertices as little as it allows, so that no lip lies in the other.
 
-    One-sided rows at the edges that enter the other lip (`parting_rows`), found again after each
-    solve; those of earlier rounds stay, so that a vertex does not go back.
+    One-sided constraints at the edges that enter the other lip (`separation_constraints`), found
+    again after each solve; those of earlier rounds stay, so that a vertex does not go back.
 
     Args:
         vertices_mm: (V, 3), any frame.
+        crossings: finds where the lips cross.
+        energy: of displacements, mm.
+        rounds: of solving.
     """
     start = np.asarray(vertices_mm, dtype=np.float64)
-    rows, before = parting_rows(crossings, start, start)
+    constraints, before = separation_constraints(crossings, start, start)
     current, after, best = start, before, (before, start)
     for _ in range(rounds):
         if after <= SLACK_MM:
             break
         current = start.copy()
-        current[solver.free] += solver.solve(rows)
-        more, after = parting_rows(crossings, start, current)
+        current[energy.free] += energy.minimise(constraints)
+        more, after = separation_constraints(crossings, start, current)
         best = min(best, (after, current), key=lambda pair: pair[0])
-        rows = rows + more
-    return Parted(best[1], before, best[0])
+        constraints = constraints + more
+    return SeparatedLips(best[1], before, best[0])
 
 
 @dataclass(frozen=True)
@@ -75,12 +81,12 @@ class LipVolumes:
     @classmethod
     def of(cls, face: FaceModel) -> LipVolumes:
         """Lips of a face model: the vermilion and a little of the lips' inside."""
-        sides = lips_with_inside(face)[face.triangles]
-        upper, lower = (face.triangles[(sides == side).all(axis=1)] for side in (1, 2))
+        sides = lip_sides(face, with_inside=True)[face.triangles]
+        upper, lower = (face.triangles[(sides == side).all(axis=1)] for side in (1, -1))
         return cls(upper, lower, boundary_edges(upper), boundary_edges(lower))
 
     def measure(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """Volumes (F, 2) mm3 of the upper and the lower lip of meshes (F, V, 3).
+        """Volumes (F, 2) mm3 of the upper and the lower lip of meshes vertices_mm (F, V, 3).
 
         Between each lip's skin and the fan from the middle of its rim.
         """

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def resampled(points_px: np.ndarray, step_px: float, most: int) -> tuple[np.ndarray, float]:
-    """Points (n, 2) evenly along a curve about `step_px` apart, at most `most`; and the step."""
+    """Points (n, 2) evenly along a curve points_px (m, 2), about `step_px` apart, at most `most`; and the step."""
     lengths = np.linalg.norm(np.diff(points_px, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     count = int(np.clip(np.ceil(along[-1] / step_px), 1, most - 1)) + 1
@@ -16,7 +16,7 @@ def resampled(points_px: np.ndarray, step_px: float, most: int) -> tuple[np.ndar
 
 
 def first_self_crossing(points_px: np.ndarray) -> tuple[int, int] | None:
-    """The first two segments (i, j) of an open curve that cross; None where none do."""
+    """The first two segments (i, j) of an open curve points_px (n, 2) that cross; None where none do."""
     start, end = points_px[:-1], points_px[1:]
     for i in range(len(start) - 2):
         others = slice(i + 2, None)
@@ -32,7 +32,7 @@ def first_self_crossing(points_px: np.ndarray) -> tuple[int, int] | None:
 def mouth_axes(curves: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """(along, up) unit vectors (2,) in the image: along the mouth, and across it towards the nose.
 
-    Along the longest extent of the curves; up has a negative y, as pixels count downwards.
+    Along the longest extent of all curves (n, 2) px; up has a negative y, as pixels count downwards.
     """
     points = np.concatenate(curves)
     centred = points - points.mean(axis=0)
@@ -48,7 +48,8 @@ def press_together(
 
     Args:
         upper_px, lower_px: (n, 2), (m, 2), dense.
-        along, up: of `mouth_axes`.
+        along: (2,) of `mouth_axes`.
+        up: (2,) of `mouth_axes`.
 
     Returns:
         The two curves, and which points were moved, (n,) and (m,) bool.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.integration import cotangents, edge_stiffness
+from vermilion.geometry.cotangents import cotangents, edge_stiffness
 from vermilion.geometry.mesh import vertex_areas
 from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.regions import GuidedRegions
@@ -39,7 +39,7 @@ class GradientIntegrator:
         stiffness = edge_stiffness(inside, weights, regions.n_vertices)[regions.free]
         self.factor = CholeskyFactor(stiffness[:, regions.free])
         self._of_border = sparse.csr_matrix(stiffness[:, regions.border])
-        self._divergence = _divergence(neutral, inside, weights)[regions.free]
+        self._divergence = gradient_divergence(neutral, inside, weights)[regions.free]
         self._followers = (
             _Followers(neutral, regions, follow_mm) if len(regions.followers) else None
         )
@@ -80,6 +80,7 @@ class _Followers:
     """The part that hangs on the inner lips: (L + M / length^2) d = 0 with d given at the lips."""
 
     def __init__(self, neutral: np.ndarray, regions: GuidedRegions, length_mm: float):
+        """neutral: (V, 3) mm."""
         self.ids = regions.followers
         self.lips = regions.free
         touched = np.zeros(regions.n_vertices, dtype=bool)
@@ -92,14 +93,23 @@ class _Followers:
         self._of_lips = sparse.csr_matrix(own[:, self.lips])
 
     def place(self, moved: np.ndarray, base: np.ndarray) -> None:
+        """Place the followers in `moved` (F, V, 3) by where the lips were in `base` (F, V, 3), mm."""
         along = np.moveaxis(moved[:, self.lips] - base[:, self.lips], 0, 1)
         right = -self._of_lips @ along.reshape(len(self.lips), -1)
         shift = self._factor.solve(right).reshape(-1, len(moved), 3)
         moved[:, self.ids] = base[:, self.ids] + np.moveaxis(shift, 0, 1)
 
 
-def _divergence(neutral: np.ndarray, inside: np.ndarray, weights: np.ndarray) -> sparse.csr_matrix:
-    """(V, 3T): right-hand side of one coordinate from that row of each triangle's gradient."""
+def gradient_divergence(
+    neutral: np.ndarray, inside: np.ndarray, weights: np.ndarray
+) -> sparse.csr_matrix:
+    """Right-hand side of one coordinate from that row of each triangle's gradient, (V, 3T).
+
+    Args:
+        neutral: (V, 3) mm.
+        inside: (T, 3) predicted triangles.
+        weights: (T, 3) cotangents of their edges.
+    """
     index = np.arange(len(inside))[:, None] * 3 + np.arange(3)
     rows, columns, values = [], [], []
     for k in range(3):

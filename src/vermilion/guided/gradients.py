@@ -1,6 +1,6 @@
 """Deformation gradients of chosen triangles against the neutral (Guided18 section 4).
 
-`correction.gradients` is the definition; here the inverse of the neutral's frames is made once, and
+`geometry.deformation_gradients` is the definition; here the inverse of the neutral's frames is made once, and
 sequences go through a compiled loop. A test holds the two together.
 """
 
@@ -21,6 +21,7 @@ class NeutralTriangles:
     """
 
     def __init__(self, neutral_mm: np.ndarray, triangles: np.ndarray):
+        """neutral_mm: (V, 3); triangles: (n, 3)."""
         self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
         frames = triangle_frames(np.asarray(neutral_mm, np.float64), self.triangles)
         self.inverse = np.ascontiguousarray(inverse_3x3(frames))
@@ -29,7 +30,7 @@ class NeutralTriangles:
         return len(self.triangles)
 
     def gradients(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """F = D_d D_r^-1 of each triangle, row by row: (F, n * 9) of meshes (F, V, 3).
+        """F = D_d D_r^-1 of each triangle, row by row: (F, n * 9) of meshes vertices_mm (F, V, 3).
 
         The identity where the neutral triangle has no area.
         """

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.geometry.mesh import rigid_alignment
-from vermilion.guided.contact import part_lips
+from vermilion.geometry.alignment import move_frames, similarity_alignment
+from vermilion.guided.constrained_energy import ConstrainedEnergy
+from vermilion.guided.contact import separate_lips
 from vermilion.guided.dirichlet import FOLLOW_MM, GradientIntegrator
 from vermilion.guided.gradients import NeutralTriangles
 from vermilion.guided.reduced_regression import ReducedRegression
 from vermilion.guided.regions import GuidedRegions
-from vermilion.guided.row_solver import RowSolver
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError, ModelFileError
 
@@ -31,7 +31,9 @@ class Propagation:
     Attributes:
         vertices_mm: (F, V, 3) float64, in the frame of the input.
         unexplained: (F,) share of the mouth region's deformation that no training frame spans, in
-            [0, 1]: the higher, the more a frame needs a correction of its own.
+            [0, 1]: the higher, the more a frame needs a correction of its own. Of a frame that is
+            deformed less than the corrected ones in the mean, it is the share of that mean: a mouth
+            at rest needs none.
         depth_mm: (F,) how deep one lip lies in the other; 0 without contact.
     """
 
@@ -52,6 +54,7 @@ class LipPropagator:
         stable: (s,) vertices that hold the alignment.
         base: whether the regression predicts the change of the base's lips (True) or the lips
             themselves (False, the paper).
+        scale: mean length of the corrected frames' trusted gradients less the neutral's.
         regression: fitted by `fit`.
     """
 
@@ -84,8 +87,8 @@ class LipPropagator:
         self._trusted = NeutralTriangles(rest, local.triangles[local.trusted])
         self._predicted = NeutralTriangles(rest, local.triangles[local.predicted])
         self._neutral_y = self._trusted.gradients(rest[None])
-        self._solver = RowSolver(self.integrator.factor, regions.free, regions.n_vertices)
-        self.base = False
+        self._energy = ConstrainedEnergy(self.integrator.factor, regions.free, regions.n_vertices)
+        self.base, self.scale = False, 0.0
         self.regression: ReducedRegression | None = None
 
     def fit(
@@ -115,8 +118,9 @@ class LipPropagator:
         self.base = change and base_mm is not None
         if base_mm is not None:
             self._check_meshes(base_mm, "base frames")
-            aligned = _to_neutral(base_mm[:, self._mouth], motions)
+            aligned = move_frames(base_mm[:, self._mouth], *motions)
         y = self._trusted.gradients(aligned)
+        self.scale = float(np.linalg.norm(y - self._neutral_y, axis=1).mean())
         if self.base:
             x = x - self._predicted.gradients(aligned)
         if with_neutral:
@@ -129,10 +133,11 @@ class LipPropagator:
     def correct(
         self, sequence_mm: np.ndarray, crossings: LipCrossings | None = None
     ) -> Propagation:
-        """Correct frames (F, V, 3); each result depends on its own frame alone.
+        """Correct frames; each result depends on its own frame alone.
 
         Args:
-            crossings: the lips, to part where one would pass through the other; None: the paper.
+            sequence_mm: (F, V, 3), any rigid poses.
+            crossings: the lips, to separate where one would pass through the other; None: the paper.
 
         Raises:
             InputError: nothing was learnt yet, another topology, or a mesh that is not finite.
@@ -144,17 +149,19 @@ class LipPropagator:
         unexplained, depth = np.zeros(len(result)), np.zeros(len(result))
         for first in range(0, len(result), _BLOCK):
             part = slice(first, first + _BLOCK)
-            aligned, (rotation, translation) = self._aligned(result[part])
+            aligned, (rotations, translations_mm) = self._aligned(result[part])
             y = self._trusted.gradients(aligned)
-            unexplained[part] = self.regression.unexplained(y, self._neutral_y[0])
+            deformation = np.linalg.norm(y - self._neutral_y, axis=1)
+            share = self.regression.unexplained(y, self._neutral_y[0])
+            unexplained[part] = share * deformation / np.maximum(deformation, self.scale)
             x = self.regression.predict(y)
             if self.base:
                 x += self._predicted.gradients(aligned)
             corrected = self.integrator.integrate(x, aligned)
             if crossings is not None:
-                depth[part] = self._part_lips(corrected, aligned, crossings)
+                depth[part] = self._separate_lips(corrected, aligned, crossings)
             for ids in (self._local.free, self._local.followers):
-                moved = (corrected[:, ids] - translation[:, None]) @ rotation
+                moved = (corrected[:, ids] - translations_mm[:, None]) @ rotations
                 result[part, self._mouth[ids]] = moved
         return Propagation(result, unexplained, depth)
 
@@ -162,16 +169,17 @@ class LipPropagator:
         """Write the fitted propagator as `.npz` (no pickle), whole or not at all."""
         if self.regression is None:
             raise InputError("no training to save", "a call of `fit` first", "Train first.")
-        write_arrays(
-            path,
-            propagator_version=np.int64(FORMAT_VERSION),
-            neutral_mm=self.neutral_mm,
-            stable=self.stable,
-            follow_mm=np.float64(self.follow_mm),
-            base=np.bool_(self.base),
+        arrays: dict[str, Any] = {
+            "propagator_version": np.int64(FORMAT_VERSION),
+            "neutral_mm": self.neutral_mm,
+            "stable": self.stable,
+            "follow_mm": np.float64(self.follow_mm),
+            "base": np.bool_(self.base),
+            "scale": np.float64(self.scale),
             **self.regions.arrays(),
             **self.regression.arrays(),
-        )
+        }
+        write_arrays(path, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -185,7 +193,16 @@ class LipPropagator:
                 "Train it again with this version of Vermilion.",
                 path=path,
             )
-        names = ("neutral_mm", "stable", "follow_mm", "base", "triangles", "predicted", "trusted")
+        names = (
+            "neutral_mm",
+            "stable",
+            "follow_mm",
+            "base",
+            "scale",
+            "triangles",
+            "predicted",
+            "trusted",
+        )
         missing = [name for name in names if name not in arrays]
         if missing:
             raise ModelFileError(
@@ -194,32 +211,30 @@ class LipPropagator:
             )  # fmt: skip
         regions = GuidedRegions.from_arrays(arrays)
         result = cls(arrays["neutral_mm"], regions, arrays["stable"], float(arrays["follow_mm"]))
-        result.base = bool(arrays["base"])
+        result.base, result.scale = bool(arrays["base"]), float(arrays["scale"])
         result.regression = ReducedRegression.from_arrays(arrays, str(path))
         return result
 
-    def _part_lips(
+    def _separate_lips(
         self, corrected: np.ndarray, aligned: np.ndarray, crossings: LipCrossings
     ) -> np.ndarray:
-        """Part the lips of meshes (F, U, 3) in place; depths (F,) mm that are left."""
+        """Separate the lips of meshes (F, U, 3) in place; depths (F,) mm that are left."""
         depth, mesh = np.zeros(len(corrected)), self.neutral_mm.copy()
         for f, mouth in enumerate(corrected):
             mesh[self._mouth] = mouth
-            parted = part_lips(mesh, crossings, self._solver)
-            depth[f] = parted.after_mm
-            mouth[:] = parted.vertices_mm[self._mouth]
+            found = separate_lips(mesh, crossings, self._energy)
+            depth[f] = found.after_mm
+            mouth[:] = found.vertices_mm[self._mouth]
         self.integrator.follow(corrected, aligned)
         return depth
 
     def _aligned(self, meshes_mm: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """The mouths (F, U, 3) of meshes on the neutral; the motions (F, 3, 3), (F, 3) there."""
         target = self.neutral_mm[self.stable]
-        pairs = [
-            rigid_alignment(np.asarray(mesh, np.float64), target)
-            for mesh in meshes_mm[:, self.stable]
-        ]
-        motions = tuple(np.stack(part) for part in zip(*pairs, strict=True))
-        return _to_neutral(meshes_mm[:, self._mouth], motions), motions
+        stable = np.asarray(meshes_mm[:, self.stable], dtype=np.float64)
+        found = [similarity_alignment(mesh, target, scale=1.0) for mesh in stable]
+        motions = (np.stack([f.rotation for f in found]), np.stack([f.translation for f in found]))
+        return move_frames(meshes_mm[:, self._mouth], *motions), motions
 
     def _check_meshes(self, meshes_mm: np.ndarray, name: str) -> None:
         expected = self.neutral_mm.shape
@@ -229,22 +244,12 @@ class LipPropagator:
                 f"(frames, {expected[0]}, 3), the topology of the neutral",
                 "Resample the meshes onto the neutral's topology.",
             )
-        finite = [
-            np.isfinite(meshes_mm[:, ids]).all(axis=(1, 2)) for ids in (self._mouth, self.stable)
-        ]
-        bad = np.flatnonzero(~(finite[0] & finite[1]))
+        # A sum is finite where all of its terms are: one pass without an array of flags.
+        sums = [meshes_mm[:, ids].sum(axis=(1, 2)) for ids in (self._mouth, self.stable)]
+        bad = np.flatnonzero(~np.isfinite(sums).all(axis=0))
         if len(bad):
             raise InputError(
                 f"{name} with frames {bad[:10].tolist()} that are not finite",
                 "finite vertices round the mouth",
                 "Leave these frames out.",
             )
-
-
-def _to_neutral(meshes_mm: np.ndarray, motions: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """(F, U, 3) vertices after the motions (F, 3, 3), (F, 3)."""
-    result = np.empty(meshes_mm.shape, dtype=np.float64)
-    for mesh, rotation, translation, moved in zip(meshes_mm, *motions, result, strict=True):
-        np.dot(mesh, rotation.T, out=moved)
-        moved += translation
-    return result

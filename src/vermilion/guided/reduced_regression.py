@@ -39,7 +39,7 @@ class ReducedBasis:
 
 
 def reduced_basis(columns: np.ndarray) -> ReducedBasis:
-    """Thin SVD of A given as its transpose (k, N), N much larger than k.
+    """Thin SVD of A given as its transpose, columns (k, N), N much larger than k.
 
     From the k x k matrix A^T A, and where frames are alike once more from the result: the second
     pass makes the directions orthonormal to rounding. A fifth of the time of LAPACK's SVD. Frames
@@ -89,7 +89,7 @@ class ReducedRegression:
         return self
 
     def predict(self, trusted: np.ndarray) -> np.ndarray:
-        """x = U_X theta_r U_Y^T y of frames (F, 9m), (F, 9n)."""
+        """x = U_X theta_r U_Y^T y, (F, 9n), of frames trusted (F, 9m)."""
         self._check_width(trusted)
         return (trusted @ self.trusted_basis_.T @ self.reduced_.T) @ self.predicted_basis_
 
@@ -110,7 +110,7 @@ class ReducedRegression:
         return np.minimum(share, 1.0)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Everything fitted, by name, for a `.npz` (no pickle)."""
+        """Everything fitted, by name, for a `.npz` (no pickle): bases (r, 9m), (s, 9n), reduced (s, r)."""
         return {
             "regression_version": np.int64(FORMAT_VERSION),
             "trusted_basis": self.trusted_basis_,
@@ -121,7 +121,7 @@ class ReducedRegression:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray], path: str | None = None) -> Self:
-        """What `arrays` gave. Raises ModelFileError on another version or a missing array."""
+        """A regression of what `arrays` (r, 9m), ... gave. Raises ModelFileError on another version or a missing array."""
         version = int(arrays.get("regression_version", -1))
         if version != FORMAT_VERSION:
             raise ModelFileError(

@@ -7,7 +7,7 @@ deforms slowly, and silhouettes are found anew. For the displacements x of an it
     E = sum_i lambda_pos,i |x_i|^2 + lambda_reg |L x|^2 + lambda_silh sum_p |r_p - (v_p + x_p)|^2 ,
 
 and only the last term changes: the matrix of the first two is factored once a topology, the rays are
-rows beside it (`RowSolver`).
+constraints beside it (`ConstrainedEnergy`).
 """
 
 from __future__ import annotations
@@ -18,22 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from vermilion.correction.constraints import Rows
-from vermilion.correction.lip_constraints import SLACK_MM, parting_rows
+from vermilion.correction.constraints import LinearConstraints
+from vermilion.correction.lip_constraints import SLACK_MM, separation_constraints
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import adjacency
-from vermilion.geometry.mesh_points import MeshPoints
 from vermilion.geometry.sparse import CholeskyFactor
+from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.curves import mouth_axes, press_together, resampled
 from vermilion.guided.regions import GuidedRegions, movable_vertices
-from vermilion.guided.row_solver import RowSolver
 from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
 from vermilion.guided.sketch import Sketch
 from vermilion.storage.errors import InputError
 
-_PARTING_ROUNDS = 3
-_PARTING_ROUNDS_LAST = 8
+_SEPARATION_ROUNDS = 3
+_SEPARATION_ROUNDS_LAST = 8
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ class View:
         return cls(camera, up, samples, weights)
 
     def contours(self, vertices_mm: np.ndarray, surface: LipSurface) -> dict[str, Segments]:
-        """Curve name -> where that contour of a mesh (V, 3) is now.
+        """Curve name -> where that contour of a mesh vertices_mm (V, 3) is now.
 
         Raises InputError where the camera sees no such contour.
         """
@@ -166,17 +165,17 @@ class SketchRefiner:
 
         Args:
             surface: where contours are looked for (`LipSurface.of_face`, `.of_regions`).
-            still: vertices that should hardly move; None: those that hang on the inner lips, which
+            still: (s,) vertices that should hardly move; None: those that hang on the inner lips, which
                 are hidden inside the mouth.
-            crossings: the lips, to part where one would pass through the other; None: the paper.
+            crossings: the lips, to separate where one would pass through the other; None: the paper.
         """
         self.settings = settings or RefinementSettings()
         self.movable = movable_vertices(regions)
         self._surface, self._crossings = surface, crossings
         position = np.full(regions.n_vertices, self.settings.position)
         position[regions.followers if still is None else still] = self.settings.still
-        matrix = _keeping_matrix(regions, self.movable, position, self.settings.regularity)
-        self._solver = RowSolver(CholeskyFactor(matrix), self.movable, regions.n_vertices)
+        matrix = keeping_matrix(regions, self.movable, position, self.settings.regularity)
+        self._energy = ConstrainedEnergy(CholeskyFactor(matrix), self.movable, regions.n_vertices)
 
     def refine(self, vertices_mm: np.ndarray, views: Sequence[tuple[Sketch, Camera]]) -> Refined:
         """Move the lips of a mesh (V, 3) onto the sketches of one frame, of one camera or several.
@@ -200,35 +199,38 @@ class SketchRefiner:
                 "Choose another frame; this one was not reconstructed.",
             )
         for iteration in range(self.settings.iterations):
-            rows = _joined([self._view_rows(current, view) for view in ready])
+            rays = _joined([self._view_constraints(current, view) for view in ready])
             last = iteration == self.settings.iterations - 1
-            current = self._solved(current, rows, _PARTING_ROUNDS_LAST if last else _PARTING_ROUNDS)
+            rounds = _SEPARATION_ROUNDS_LAST if last else _SEPARATION_ROUNDS
+            current = self._solved(current, rays, rounds)
         distance = {view.camera.name: self._distances(current, view) for view in ready}
         depth = self._crossings.find(current).deepest_mm if self._crossings else 0.0
         return Refined(current, distance, depth)
 
-    def _view_rows(self, vertices_mm: np.ndarray, view: View) -> Rows:
-        rows = []
+    def _view_constraints(self, vertices_mm: np.ndarray, view: View) -> LinearConstraints:
+        found = []
         for name, segments in view.contours(vertices_mm, self._surface).items():
             points, _ = segments.nearest(view.samples[name])
-            rows.append(
-                ray_rows(points, vertices_mm, view.camera, view.samples[name], view.weights[name])
-            )
-        return _joined(rows)
+            at_mm = points.sample(vertices_mm, self._surface.triangles)
+            corners = points.corners(self._surface.triangles)
+            rays = (view.camera, view.samples[name], view.weights[name])
+            found.append(ray_constraints(corners, points.barycentric, at_mm, *rays))
+        return _joined(found)
 
-    def _solved(self, start: np.ndarray, rows: Rows, rounds: int) -> np.ndarray:
+    def _solved(self, start: np.ndarray, rays: LinearConstraints, rounds: int) -> np.ndarray:
         """One solve from `start`, and more where lips would pass through each other."""
         moved = start.copy()
-        moved[self.movable] += self._solver.solve(rows)
+        moved[self.movable] += self._energy.minimise(rays)
         if self._crossings is None:
             return moved
+        constraints = rays
         for _ in range(rounds):
-            parting, deepest = parting_rows(self._crossings, start, moved)
+            separation, deepest = separation_constraints(self._crossings, start, moved)
             if deepest <= SLACK_MM:
                 break
-            rows = rows + parting
+            constraints = constraints + separation
             moved = start.copy()
-            moved[self.movable] += self._solver.solve(rows)
+            moved[self.movable] += self._energy.minimise(constraints)
         return moved
 
     def _distances(self, vertices_mm: np.ndarray, view: View) -> dict[str, np.ndarray]:
@@ -236,31 +238,42 @@ class SketchRefiner:
         return {name: found[name].nearest(view.samples[name])[1] for name in found}
 
 
-def ray_rows(
-    points: MeshPoints, vertices_mm: np.ndarray, camera: Camera, pixels: np.ndarray, weight: float
-) -> Rows:
-    """Two rows a pixel that bring a point of the mesh onto the pixel's ray; depth is free.
+def ray_constraints(
+    vertices: np.ndarray,
+    coefficients: np.ndarray,
+    points_mm: np.ndarray,
+    camera: Camera,
+    pixels: np.ndarray,
+    weight: float,
+) -> LinearConstraints:
+    """Two constraints a pixel that bring a point of the mesh onto the pixel's ray; depth is free.
 
     Args:
-        points: P on the mesh; vertices_mm: (V, 3); pixels: (P, 2).
+        vertices, coefficients: (P, k) ids and weights of the vertices that carry each point.
+        points_mm: (P, 3) where the points are now, world.
+        camera: of the image.
+        pixels: (P, 2) px.
+        weight: of a pixel.
     """
     origins, rays = camera.rays(pixels)
     helper = np.where(np.abs(rays[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     first = np.cross(rays, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     directions = np.concatenate([first, np.cross(rays, first)])
-    off = np.tile(origins - points.of(vertices_mm), (2, 1))
+    off = np.tile(origins - points_mm, (2, 1))
     count = len(directions)
-    return Rows(
-        np.tile(points.vertices, (2, 1)), np.tile(points.weights, (2, 1)), directions,
+    return LinearConstraints(
+        np.tile(vertices, (2, 1)), np.tile(coefficients, (2, 1)), directions,
         (off * directions).sum(axis=1), np.full(count, 1.0 / weight), np.zeros(count, dtype=bool),
     )  # fmt: skip
 
 
-def _keeping_matrix(
+def keeping_matrix(
     regions: GuidedRegions, movable: np.ndarray, position: np.ndarray, regularity: float
 ) -> sparse.csr_matrix:
-    """Matrix (N, N) of sum_i lambda_i |x_i|^2 + lambda_reg |L x|^2 over the movable vertices.
+    """Matrix (N, N) of sum_i lambda_i |x_i|^2 + lambda_reg |L x|^2 over the movable vertices (N,).
+
+    `position` (V,) has the lambda_i.
 
     L = D - A, the symmetric Laplacian of Sorkine et al. 2004; rows of vertices that stay count,
     too, so that the rim shows no crease.
@@ -272,8 +285,8 @@ def _keeping_matrix(
     return sparse.csr_matrix(keeping)
 
 
-def _joined(rows: list[Rows]) -> Rows:
-    total = rows[0]
-    for more in rows[1:]:
+def _joined(parts: list[LinearConstraints]) -> LinearConstraints:
+    total = parts[0]
+    for more in parts[1:]:
         total = total + more
     return total

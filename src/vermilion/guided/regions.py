@@ -68,17 +68,17 @@ class GuidedRegions:
         )  # fmt: skip
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What `from_arrays` needs, for a `.npz`."""
+        """What `from_arrays` needs, for a `.npz`: triangles (T, 3), predicted (n,), trusted (m,)."""
         return {
             "triangles": np.asarray(self.triangles, dtype=np.int32),
-            "n_vertices": np.int64(self.n_vertices),
+            "n_vertices": np.array(self.n_vertices, dtype=np.int64),
             "predicted": self.predicted,
             "trusted": self.trusted,
         }
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> GuidedRegions:
-        """The regions that `arrays` described."""
+        """The regions of what `arrays` gave: triangles (T, 3), predicted (n,), trusted (m,)."""
         return regions_of_triangles(
             arrays["triangles"],
             int(arrays["n_vertices"]),
@@ -142,7 +142,7 @@ def regions_of_vertices(
 def regions_of_triangles(
     triangles: np.ndarray, n_vertices: int, predicted: np.ndarray, trusted: np.ndarray
 ) -> GuidedRegions:
-    """Regions from two lists of triangles, (n,) and (m,) ids; the vertices are told from them.
+    """Regions from two lists of triangles: predicted (n,) and trusted (m,) ids.
 
     Raises:
         InputError: an empty or overlapping region, or inner lips that nothing holds in place.

@@ -12,52 +12,90 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
-from vermilion.faces.lips import lips_with_inside
+from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import boundary_edges, normalised, triangle_cross
-from vermilion.geometry.mesh_points import MeshPoints
+from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.guided.regions import GuidedRegions
 
-UPPER, LOWER = 1, 2
+UPPER, LOWER = 1, -1
+
+
+@dataclass(frozen=True)
+class SurfaceEdges:
+    """Edges of a mesh as segments on its surface.
+
+    Attributes:
+        vertices: (e, 2) ids.
+        start, end: e points each, at the two ends, both bound to the same triangle.
+    """
+
+    vertices: np.ndarray
+    start: SurfacePoints
+    end: SurfacePoints
+
+    @classmethod
+    def of(cls, edges: np.ndarray, triangles: np.ndarray) -> SurfaceEdges:
+        """edges: (e, 2) ids, of a mesh of triangles (T, 3)."""
+        ends = (
+            SurfacePoints.on_edges(edges[:, 0], edges[:, 1], np.full(len(edges), share), triangles)
+            for share in (0.0, 1.0)
+        )
+        return cls(edges, *ends)
 
 
 @dataclass(frozen=True)
 class LipSurface:
-    """The triangles on which contours are looked for.
+    """The part of a mesh on which contours are looked for.
 
     Attributes:
-        triangles: (n, 3) that may carry the inner silhouette.
+        triangles: (T, 3) of the mesh.
+        candidates: (n,) ids of the triangles that may carry the inner silhouette.
         around: (k, 3) triangles that touch their vertices, for the normals.
-        rim: (b, 2) edges of `triangles` where the mesh itself ends.
-        sides: (V,) int8: 1 upper lip, 2 lower; 0 unknown: only the projected normal tells.
-        outer_upper, outer_lower: (e, 2) edges of the border of the red; empty where unknown.
+        sides: (V,) int8: +1 upper lip, -1 lower; 0 unknown: only the projected normal tells.
+        rim: edges of the candidates where the mesh itself ends.
+        outer_upper, outer_lower: edges of the border of the red; none where unknown.
     """
 
     triangles: np.ndarray
+    candidates: np.ndarray
     around: np.ndarray
-    rim: np.ndarray
     sides: np.ndarray
-    outer_upper: np.ndarray
-    outer_lower: np.ndarray
+    rim: SurfaceEdges
+    outer_upper: SurfaceEdges
+    outer_lower: SurfaceEdges
 
     @classmethod
     def of_regions(cls, regions: GuidedRegions) -> LipSurface:
         """The predicted triangles of any topology: no sides, no outer contour."""
         nobody = np.zeros(regions.n_vertices, dtype=np.int8)
         none = np.zeros((0, 2), dtype=np.int64)
-        chosen = regions.triangles[regions.predicted]
-        return cls(*_around(regions.triangles, chosen, regions.n_vertices), nobody, none, none)
+        return cls._of(regions.triangles, regions.predicted, nobody, (none, none))
 
     @classmethod
     def of_face(cls, face: FaceModel, regions: GuidedRegions) -> LipSurface:
         """The lips of a face model and the predicted triangles, with sides and outer contour."""
-        sides = lips_with_inside(face)
-        of_lips = (sides > 0)[face.triangles].all(axis=1)
+        sides = lip_sides(face, with_inside=True)
+        of_lips = (sides != 0)[face.triangles].all(axis=1)
         of_lips[regions.predicted] = True
-        upper, lower = outer_halves(face)
-        chosen = face.triangles[of_lips]
-        return cls(*_around(face.triangles, chosen, face.n_vertices), sides, upper, lower)
+        return cls._of(face.triangles, np.flatnonzero(of_lips), sides, outer_halves(face))
+
+    @classmethod
+    def _of(
+        cls,
+        triangles: np.ndarray,
+        candidates: np.ndarray,
+        sides: np.ndarray,
+        outer: tuple[np.ndarray, np.ndarray],
+    ) -> LipSurface:
+        touched = np.zeros(len(sides), dtype=bool)
+        touched[triangles[candidates]] = True
+        around = triangles[touched[triangles].any(axis=1)]
+        ends = boundary_edges(triangles)
+        upper, lower = (SurfaceEdges.of(edges, triangles) for edges in outer)
+        rim = SurfaceEdges.of(ends[touched[ends].all(axis=1)], triangles)
+        return cls(triangles, candidates, around, sides, rim, upper, lower)
 
 
 @dataclass(frozen=True)
@@ -65,14 +103,14 @@ class Segments:
     """Segments on a mesh, seen by a camera.
 
     Attributes:
-        start, end: S points each, of two vertices.
+        start, end: S points each, the ends of a segment bound to the same triangle.
         start_px, end_px: (S, 2).
         start_depth, end_depth: (S,) mm along the view.
-        normal: (S, 3) of the surface.
+        normal: (S, 3) of the surface, not of unit length.
     """
 
-    start: MeshPoints
-    end: MeshPoints
+    start: SurfacePoints
+    end: SurfacePoints
     start_px: np.ndarray
     end_px: np.ndarray
     start_depth: np.ndarray
@@ -88,8 +126,17 @@ class Segments:
             self.start_depth[chosen], self.end_depth[chosen], self.normal[chosen],
         )  # fmt: skip
 
-    def nearest(self, pixels: np.ndarray) -> tuple[MeshPoints, np.ndarray]:
-        """The nearest point to the ray of each pixel (P, 2), and its distance (P,) px.
+    def shared_vertex(self, triangles: np.ndarray) -> np.ndarray:
+        """The corner from which both ends are reached along edges of triangles (T, 3), (S,) ids.
+
+        The start of a segment that is itself an edge.
+        """
+        corners, rows = self.start.corners(triangles), np.arange(len(self))
+        both = np.minimum(self.start.barycentric, self.end.barycentric)
+        return corners[rows, (both + 1e-9 * self.start.barycentric).argmax(axis=1)]
+
+    def nearest(self, pixels: np.ndarray) -> tuple[SurfacePoints, np.ndarray]:
+        """The nearest point to the ray of pixels (P, 2), P of them, and its distance (P,) px.
 
         Raises ValueError where there is no segment.
         """
@@ -104,13 +151,10 @@ class Segments:
         image = fraction[np.arange(len(pixels)), best]
         # Halfway in the image is not halfway on the surface: the nearer end counts more.
         near, far = image / self.end_depth[best], (1 - image) / self.start_depth[best]
-        share = near / (near + far)
+        share = (near / (near + far))[:, None]
         start, end = self.start[best], self.end[best]
-        vertices = np.concatenate([start.vertices, end.vertices], axis=1)
-        weights = np.concatenate(
-            [start.weights * (1 - share)[:, None], end.weights * share[:, None]], axis=1
-        )
-        return MeshPoints(vertices, weights), np.sqrt(apart.min(axis=1))
+        between = (1 - share) * start.barycentric + share * end.barycentric
+        return SurfacePoints(start.triangle, between), np.sqrt(apart.min(axis=1))
 
 
 def inner_silhouettes(
@@ -128,7 +172,7 @@ def inner_silhouettes(
     normals = normalised(_normals(vertices_mm, surface))
     segments = _zero_segments(vertices_mm, normals, surface, camera)
     projected = segments.normal @ camera.rotation[:2].T @ up
-    sides = surface.sides[segments.start.vertices[:, 0]]
+    sides = surface.sides[segments.shared_vertex(surface.triangles)]
     upper = (projected < 0) & (sides != LOWER)
     lower = (projected > 0) & (sides != UPPER)
     return segments[upper], segments[lower]
@@ -137,11 +181,17 @@ def inner_silhouettes(
 def outer_contours(
     vertices_mm: np.ndarray, surface: LipSurface, camera: Camera
 ) -> tuple[Segments, Segments]:
-    """(upper, lower) border of the red, which is a line of the mesh."""
-    return tuple(
-        _edge_segments(vertices_mm, edges, np.zeros((len(vertices_mm), 3)), camera)
+    """(upper, lower) border of the red, which is a line of the mesh.
+
+    Args:
+        vertices_mm: (V, 3), the camera's world.
+    """
+    flat = np.zeros((len(vertices_mm), 3))
+    upper, lower = (
+        _edge_segments(vertices_mm, flat, edges, surface.triangles, camera)
         for edges in (surface.outer_upper, surface.outer_lower)
     )
+    return upper, lower
 
 
 def outer_halves(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
@@ -157,14 +207,6 @@ def outer_halves(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     if points[1:turn, 1].mean() < points[turn + 1 :, 1].mean():
         return second, first
     return first, second
-
-
-def _around(triangles: np.ndarray, chosen: np.ndarray, n_vertices: int) -> tuple[np.ndarray, ...]:
-    touched = np.zeros(n_vertices, dtype=bool)
-    touched[chosen] = True
-    around = triangles[touched[triangles].any(axis=1)]
-    ends = boundary_edges(triangles)
-    return chosen, around, ends[touched[ends].all(axis=1)]
 
 
 def _normals(vertices_mm: np.ndarray, surface: LipSurface) -> np.ndarray:
@@ -183,43 +225,54 @@ def _zero_segments(
     vertices_mm: np.ndarray, normals: np.ndarray, surface: LipSurface, camera: Camera
 ) -> Segments:
     """Segments where normal . view = 0 inside triangles, and the mesh's own ends that face us."""
-    corners = surface.triangles
+    corners = surface.triangles[surface.candidates]
     ids = np.unique(corners)
     facing = np.zeros(len(vertices_mm))
     facing[ids] = ((camera.centre_mm - vertices_mm[ids]) * normals[ids]).sum(axis=1)
     front = facing[corners] > 0
     mixed = front.any(axis=1) & ~front.all(axis=1)
-    corners, front = corners[mixed], front[mixed]
+    values, front = facing[corners[mixed]], front[mixed]
     # The corner that faces another way than the other two: both edges from it are crossed.
     alone = np.where(front.sum(axis=1) == 1, front.argmax(axis=1), (~front).argmax(axis=1))
-    rows = np.arange(len(corners))
-    lone, second, third = (corners[rows, (alone + k) % 3] for k in range(3))
+    rows = np.arange(len(values))
     ends = []
-    for other in (second, third):
-        fraction = facing[lone] / (facing[lone] - facing[other])
-        ends.append(MeshPoints.on_edges(lone, other, fraction))
-    middle = 0.5 * (ends[0].of(normals) + ends[1].of(normals))
-    found = _seen(vertices_mm, *ends, middle, camera)
-    rim = surface.rim[(facing[surface.rim] > 0).all(axis=1)]
-    if len(rim) == 0:
+    for other in ((alone + 1) % 3, (alone + 2) % 3):
+        fraction = values[rows, alone] / (values[rows, alone] - values[rows, other])
+        barycentric = np.zeros((len(values), 3))
+        barycentric[rows, alone], barycentric[rows, other] = 1.0 - fraction, fraction
+        ends.append(SurfacePoints(surface.candidates[mixed], barycentric))
+    start, end = ends
+    normal = start.sample(normals, surface.triangles) + end.sample(normals, surface.triangles)
+    found = _seen(vertices_mm, start, end, normal, surface.triangles, camera)
+    chosen = (facing[surface.rim.vertices] > 0).all(axis=1)
+    if not chosen.any():
         return found
-    return _joined(found, _edge_segments(vertices_mm, rim, normals, camera))
+    rim = SurfaceEdges(
+        surface.rim.vertices[chosen], surface.rim.start[chosen], surface.rim.end[chosen]
+    )
+    return _joined(found, _edge_segments(vertices_mm, normals, rim, surface.triangles, camera))
 
 
 def _edge_segments(
-    vertices_mm: np.ndarray, edges: np.ndarray, normals: np.ndarray, camera: Camera
+    vertices_mm: np.ndarray,
+    normals: np.ndarray,
+    edges: SurfaceEdges,
+    triangles: np.ndarray,
+    camera: Camera,
 ) -> Segments:
-    first, second = edges[:, 0], edges[:, 1]
-    nothing = np.zeros(len(edges))
-    start = MeshPoints.on_edges(first, second, nothing)
-    end = MeshPoints.on_edges(second, first, nothing)
-    return _seen(vertices_mm, start, end, normals[first] + normals[second], camera)
+    normal = normals[edges.vertices].sum(axis=1)
+    return _seen(vertices_mm, edges.start, edges.end, normal, triangles, camera)
 
 
 def _seen(
-    vertices_mm: np.ndarray, start: MeshPoints, end: MeshPoints, normal: np.ndarray, camera: Camera
+    vertices_mm: np.ndarray,
+    start: SurfacePoints,
+    end: SurfacePoints,
+    normal: np.ndarray,
+    triangles: np.ndarray,
+    camera: Camera,
 ) -> Segments:
-    first, second = start.of(vertices_mm), end.of(vertices_mm)
+    first, second = (points.sample(vertices_mm, triangles) for points in (start, end))
     depth = [camera.to_camera(points)[:, 2] for points in (first, second)]
     segments = Segments(
         start, end, camera.project(first), camera.project(second), depth[0], depth[1], normal
@@ -229,12 +282,12 @@ def _seen(
 
 
 def _joined(a: Segments, b: Segments) -> Segments:
-    points = [
-        MeshPoints(
-            np.concatenate([getattr(a, k).vertices, getattr(b, k).vertices]),
-            np.concatenate([getattr(a, k).weights, getattr(b, k).weights]),
+    start, end = (
+        SurfacePoints(
+            np.concatenate([first.triangle, second.triangle]),
+            np.concatenate([first.barycentric, second.barycentric]),
         )
-        for k in ("start", "end")
-    ]
+        for first, second in ((a.start, b.start), (a.end, b.end))
+    )
     names = ("start_px", "end_px", "start_depth", "end_depth", "normal")
-    return Segments(*points, *(np.concatenate([getattr(a, n), getattr(b, n)]) for n in names))
+    return Segments(start, end, *(np.concatenate([getattr(a, n), getattr(b, n)]) for n in names))

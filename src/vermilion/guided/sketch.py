@@ -14,8 +14,10 @@ either direction and are open.
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +37,7 @@ MOST_POINTS = 2000
 OUTSIDE_PX = 1.0
 #: JSON knows whole numbers of any length; no frame, size or pixel is so large.
 _MOST = 10**9
+_REMEDY = "Correct the sketch, or draw it again."
 
 
 @dataclass(frozen=True)
@@ -123,12 +126,12 @@ def sketch_of_json(content: object, path: str | Path | None = None) -> Sketch:
     Raises:
         InputError: a sentence about the first thing that is wrong.
     """
-    _need(isinstance(content, dict), f"a {_kind_of(content)}", "an object", path)
+    content = _object(content, "", path)
     _need(
-        content.get("format") == FORMAT, f"the format {content.get('format')!r}",
+        content["format"] == FORMAT, f"the format {content.get('format')!r}",
         f'"{FORMAT}"', path,
     )  # fmt: skip
-    version = content.get("version")
+    version = content["version"]
     _need(_is_whole(version) and version >= 1, f"the version {version!r}", "a number", path)
     if version > VERSION:
         raise InputError(
@@ -137,14 +140,14 @@ def sketch_of_json(content: object, path: str | Path | None = None) -> Sketch:
             "Update Vermilion, or save the sketch again with this version.",
             path=path,
         )
-    unit = content.get("unit")
+    unit = content["unit"]
     _need(unit == "px", f"the unit {unit!r}", '"px"', path)
-    camera, frame, size = (content.get(k) for k in ("camera", "frame", "image_size_px"))
+    camera, frame, size = (content[k] for k in ("camera", "frame", "image_size_px"))
     _need(isinstance(camera, str) and camera, f"the camera {camera!r}", "a name", path)
     _need(_is_whole(frame) and frame >= 0, f"the frame {frame!r}", "a number from 0 on", path)
     good_size = isinstance(size, list) and len(size) == 2 and all(map(_is_whole, size))
     _need(good_size and min(size) > 0, f"the image size {size!r}", "[width, height]", path)
-    curves = content.get("curves")
+    curves = content["curves"]
     _need(isinstance(curves, dict) and curves, f"the curves {curves!r:.40}", "one or more", path)
     return Sketch(
         camera, frame, tuple(size),
@@ -155,8 +158,8 @@ def sketch_of_json(content: object, path: str | Path | None = None) -> Sketch:
 def _curve(name: str, curve: object, size: list[int], path: str | Path | None) -> SketchCurve:
     _need(name in CURVE_NAMES, f"a curve named {name!r}", f"one of {', '.join(CURVE_NAMES)}", path)
     what = f"the curve {name}"
-    _need(isinstance(curve, dict), f"{what}, which is a {_kind_of(curve)}", "an object", path)
-    kind, points = curve.get("kind"), curve.get("points")
+    curve = _object(curve, f"{what}, which is ", path)
+    kind, points = curve["kind"], curve["points"]
     _need(kind in KINDS, f"{what} of the kind {kind!r}", f"one of {', '.join(KINDS)}", path)
     _need(isinstance(points, list), f"{what} with {_kind_of(points)} as points", "a list", path)
     _need(len(points) >= 2, f"{what} with {len(points)} point(s)", "two points or more", path)
@@ -188,9 +191,16 @@ def _curve(name: str, curve: object, size: list[int], path: str | Path | None) -
     return SketchCurve(values, kind)
 
 
+def _object(value: object, what: str, path: str | Path | None) -> dict[Any, Any]:
+    """A JSON object; a name that it lacks reads as None."""
+    if isinstance(value, dict):
+        return defaultdict(lambda: None, value)
+    raise InputError(f"{what}a {_kind_of(value)}", "an object", _REMEDY, path=path)
+
+
 def _need(holds: object, found: str, expected: str, path: str | Path | None) -> None:
     if not holds:
-        raise InputError(found, expected, "Correct the sketch, or draw it again.", path=path)
+        raise InputError(found, expected, _REMEDY, path=path)
 
 
 def _is_whole(value: object) -> bool:

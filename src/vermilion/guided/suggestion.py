@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.geometry.mesh import rigid_alignment, triangle_areas
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.mesh import triangle_areas
 from vermilion.guided.gradients import NeutralTriangles
 from vermilion.guided.regions import GuidedRegions
 from vermilion.storage.errors import InputError
@@ -33,7 +34,7 @@ def mouth_deformation(
     Args:
         sequence_mm: (F, V, 3), any rigid poses.
         neutral_mm: (V, 3).
-        stable: vertices that hold the alignment (as for `LipPropagator`).
+        stable: (s,) vertices that hold the alignment (as for `LipPropagator`).
         n_triangles: at most so many of the trusted triangles, evenly spread over their list.
     """
     step = max(1, -(-len(regions.trusted) // n_triangles))
@@ -47,8 +48,7 @@ def mouth_deformation(
     result = np.empty((len(sequence_mm), 9 * len(chosen)), dtype=np.float32)
     for f, mesh in enumerate(sequence_mm):
         mesh = np.asarray(mesh, dtype=np.float64)
-        rotation, translation = rigid_alignment(mesh[stable], neutral[stable])
-        aligned = mesh @ rotation.T + translation
+        aligned = similarity_alignment(mesh[stable], neutral[stable], scale=1.0).apply(mesh)
         result[f] = ((triangles.gradients(aligned[None]) - rest) * weight)[0]
     return result
 
@@ -66,7 +66,7 @@ def suggest_frames(
 
     Args:
         deformation: (F, D) of `mouth_deformation`.
-        corrected: frames corrected already: their span is explained.
+        corrected: (k,) frames corrected already: their span is explained.
         allowed: (F,) bool, frames that may be suggested (not flagged, seen by a camera).
 
     Raises:
@@ -103,19 +103,19 @@ def unexplained_share(deformation: np.ndarray, corrected: np.ndarray) -> np.ndar
 
 
 def extreme_frames(deformation: np.ndarray, count: int) -> np.ndarray:
-    """The frames of the largest deformation, largest first: the paper's extremes, taken literally."""
+    """The frames (count,) of the largest deformation (F, D), largest first: the paper's extremes."""
     _check_count(len(deformation), count)
     return np.argsort(-np.linalg.norm(deformation, axis=1), kind="stable")[:count]
 
 
 def uniform_frames(n_frames: int, count: int) -> np.ndarray:
-    """Frames evenly spread over the take, the middle of each of `count` equal parts."""
+    """Frames (count,) evenly spread over the take, the middle of each of equal parts."""
     _check_count(n_frames, count)
     return ((np.arange(count) + 0.5) * n_frames / count).astype(np.int64)
 
 
 def random_frames(n_frames: int, count: int, seed: int) -> np.ndarray:
-    """Frames drawn without repetition, ascending."""
+    """Frames (count,) drawn without repetition, ascending."""
     _check_count(n_frames, count)
     return np.sort(np.random.default_rng([seed, 1840]).permutation(n_frames)[:count])
 

@@ -17,7 +17,7 @@ FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "agains
 REGRESSOR_COLUMNS = ("regressor", "trained_on", "frames", "measured_on")
 _STAGES = (
     "capture", "multiview", "inpaint", "landmarks", "scan", "tracking", "detail",
-    "contours", "features", "correspondence", "correction",
+    "contours", "features", "correspondence", "correction", "guided",
 )  # fmt: skip
 
 

@@ -1,0 +1,77 @@
+"""What a person gives for a frame: sketches in the take's cameras, or a sculpted mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh_files import read_mesh
+from vermilion.guided.sketch import Sketch, read_sketch
+from vermilion.storage.errors import InputError
+
+
+def read_views(
+    paths: Sequence[str | Path], cameras: Mapping[str, Camera], frame: int
+) -> list[tuple[Sketch, Camera]]:
+    """Sketches of one frame with the cameras of their images.
+
+    Args:
+        paths: sketch files `<camera>/<frame:06d>.json`.
+        cameras: by name.
+        frame: that the sketches must be of.
+
+    Raises:
+        InputError: a file that is no sketch, is of another frame or camera than its name says, or
+            of a camera that the take does not have.
+    """
+    views = []
+    for path in map(Path, paths):
+        sketch = read_sketch(path)
+        named = path.parent.name
+        if (sketch.camera, sketch.frame) != (named, frame):
+            raise InputError(
+                f"a sketch of camera {sketch.camera}, frame {sketch.frame}",
+                f"camera {named}, frame {frame}, as the file is named",
+                "Rename the file, or correct what it says.",
+                path=path,
+            )
+        if named not in cameras:
+            raise InputError(
+                f"a sketch of camera {named}",
+                f"one of the take's cameras: {', '.join(sorted(cameras))}",
+                "Draw on an image of such a camera.",
+                path=path,
+            )
+        views.append((sketch, cameras[named]))
+    return views
+
+
+def read_sculpt(path: str | Path, triangles: np.ndarray, n_vertices: int) -> np.ndarray:
+    """A sculpted mesh of the sequence's topology, (V, 3) mm.
+
+    Args:
+        path: OBJ or PLY.
+        triangles: (T, 3) of the sequence.
+        n_vertices: V.
+
+    Raises:
+        InputError: another topology, or numbers that are not finite.
+    """
+    mesh = read_mesh(path)
+    same = mesh.triangles.shape == triangles.shape and (mesh.triangles == triangles).all()
+    if len(mesh.vertices_mm) != n_vertices or not same:
+        raise InputError(
+            f"a sculpt of {len(mesh.vertices_mm)} vertices and {len(mesh.triangles)} triangles",
+            f"the sequence's {n_vertices} vertices and {len(triangles)} triangles in their order",
+            "Export the frame from the corrected sequence, sculpt it, and keep the order of vertices.",
+            path=path,
+        )
+    if not np.isfinite(mesh.vertices_mm).all():
+        raise InputError(
+            "a sculpt with vertices that are not finite", "finite numbers", "Export it again.",
+            path=path,
+        )  # fmt: skip
+    return mesh.vertices_mm
