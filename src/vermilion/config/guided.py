@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vermilion.config.base import StageConfig
+from vermilion.config.base import StageConfig, section
 
 
 class RegionsConfig(StageConfig):
@@ -124,19 +124,14 @@ class GuidedConfig(StageConfig):
     contact: bool = Field(
         True, description="Keep the lips from passing through each other; `false`: as the paper."
     )
-    regions: RegionsConfig = Field(
-        default_factory=RegionsConfig, description="Inner lips and mouth region."
+    regions: RegionsConfig = section(RegionsConfig, "Inner lips and mouth region.")
+    refinement: SketchRefinementConfig = section(
+        SketchRefinementConfig, "Sketched frames (Guided18 section 5)."
     )
-    refinement: SketchRefinementConfig = Field(
-        default_factory=SketchRefinementConfig, description="Sketched frames (Guided18 section 5)."
+    propagation: PropagationConfig = section(
+        PropagationConfig, "The whole take (Guided18 section 4)."
     )
-    propagation: PropagationConfig = Field(
-        default_factory=PropagationConfig, description="The whole take (Guided18 section 4)."
-    )
-    suggestion: SuggestionConfig = Field(
-        default_factory=SuggestionConfig, description="Frames worth correcting."
-    )
-    study: GuidedStudyConfig = Field(
-        default_factory=GuidedStudyConfig,
-        description="Error against the number of corrected frames (Guided18 6.2).",
+    suggestion: SuggestionConfig = section(SuggestionConfig, "Frames worth correcting.")
+    study: GuidedStudyConfig = section(
+        GuidedStudyConfig, "Error against the number of corrected frames (Guided18 6.2)."
     )

@@ -91,7 +91,15 @@ def fit_joint_identity(
 
 
 class _JointProblem:
-    """The energy (a `GaussNewtonProblem`) with light, visibility and resolution of one state."""
+    """The energy (a `GaussNewtonProblem`) with light, visibility and resolution of one state.
+
+    Args:
+        model, problem, samples, settings: the face, the landmark energy, skin samples, weights.
+        images: linear RGB of the F frames, each `images[f]` (h, w, 3).
+        cameras: of the images.
+        frames: (F, 6 + K) pose and weights of the state.
+        shared: (S,) identity, landmark offsets and log focal lengths of the state.
+    """
 
     def __init__(
         self,
