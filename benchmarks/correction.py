@@ -240,7 +240,7 @@ def report_image(model: LipModel, take: CoarseTake, settings: CorrectionSettings
     ]
     known = np.ones((N_FRAMES, 80), dtype=bool)
     take = replace(take, image=ImageContours(face, camera, *found, known, known))
-    settings = replace(settings, image=CorrectionSettings.of(CorrectionConfig(), 30.0).image)
+    settings = replace(settings, image=CorrectionSettings.of(CorrectionConfig().at(30.0)).image)
     with_image = Corrector(model, take, settings)
     without = Corrector(model, take, replace(settings, image=None))
     ms = best_ms(

@@ -96,6 +96,18 @@ def test_no_room_imports_from_a_higher_one():
     assert wrong == []
 
 
+def test_the_library_does_not_see_the_configuration():
+    """Rooms take plain settings: of `config` they know the names of regressors alone."""
+    wrong = {
+        name: other
+        for name, others in imports().items()
+        for other in others
+        if other.startswith("config.") and other != "config.regressors"
+        if name.split(".")[0] not in ("config", "app")
+    }
+    assert wrong == {}
+
+
 def test_no_circle_of_imports():
     done, open_ = set(), []
 

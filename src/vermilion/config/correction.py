@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -127,6 +127,10 @@ class CorrectionConfig(StageConfig):
         description="`subject/take: frame` for videos that have a frame of the neutral with which the "
         "person's rig takes begin (mouth slightly open). It gives the track's error in this take.",
     )
+
+    def at(self, fps: float) -> dict[str, Any]:
+        """Plain values of `correction.correct.CorrectionSettings` for a take of `fps` a second."""
+        return {**self.integration.at(fps), "image": self.image.model_dump()}
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""

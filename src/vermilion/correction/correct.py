@@ -9,12 +9,12 @@ correct several stretches of one person with one factorisation, use one `Correct
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from vermilion.config.correction import CorrectionConfig
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.coherence import smoothed_over_time
 from vermilion.correction.image_agreement import ImageAgreement, ImageAgreementSettings
@@ -40,11 +40,9 @@ class CorrectionSettings:
     image: ImageAgreementSettings | None
 
     @classmethod
-    def of(cls, section: CorrectionConfig, fps: float) -> CorrectionSettings:
-        """From the section `correction` of the configuration, for a take of `fps` frames a second."""
-        image = ImageAgreementSettings(**section.image.model_dump())
-        integration: dict[str, Any] = section.integration.at(fps)
-        return cls(**integration, image=image)
+    def of(cls, values: Mapping[str, Any]) -> CorrectionSettings:
+        """From plain values, those of the image in a mapping below (`CorrectionConfig.at`)."""
+        return cls(**{**values, "image": ImageAgreementSettings(**values["image"])})
 
     def as_in_the_paper(self) -> CorrectionSettings:
         """Without the image, which Lips16 leaves to future work, each frame by itself."""

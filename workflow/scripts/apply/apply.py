@@ -41,7 +41,7 @@ def corrected_take(inputs, tracker, fit, cfg, frames, fps):
         tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
         frames, settings.reach_frames(fps),
     )  # fmt: skip
-    corrected = correct(model, take, CorrectionSettings.of(settings, fps))
+    corrected = correct(model, take, CorrectionSettings.of(settings.at(fps)))
     asked = np.searchsorted(take.frames, frames)
     return take[asked], corrected[asked], model
 

@@ -142,7 +142,7 @@ def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
     section = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
-    settings = CorrectionSettings.of(section, fps)
+    settings = CorrectionSettings.of(section.at(fps))
     take = CoarseTake.load(
         tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
         frames, section.reach_frames(fps),
