@@ -70,8 +70,9 @@ def test_nothing_is_corrected_unless_a_take_is_named(fresh_project):
     assert not [rule for rule in fresh_project.would_run() if rule.startswith("guided")]
 
 
-def test_a_take_that_no_sequence_is_named_for_is_refused(fresh_project):
-    guided = json.dumps({"takes": {"s1/plain": "base", "s1/phone": "H"}})
+def test_takes_that_cannot_be_corrected_or_studied_are_refused(fresh_project):
+    takes = {"s1/plain": "base", "s1/phone": "H"}
+    guided = json.dumps({"takes": takes, "study": {"takes": ["s1/nobody"]}})
     run = fresh_project.snakemake("--dry-run", "--config", f"guided={guided}", check=False)
     printed = run.stdout + run.stderr
     assert run.returncode != 0
@@ -79,6 +80,15 @@ def test_a_take_that_no_sequence_is_named_for_is_refused(fresh_project):
     assert "found 's1/phone' with the sequence H; expected a take of the sheet of role tattoo" in (
         printed
     )
+    assert "key guided.study.takes: found 's1/nobody'" in printed
+
+
+def test_the_study_of_a_studio_take_needs_its_truth_alone(fresh_project):
+    guided = json.dumps({"study": {"takes": ["s1/rom"]}})
+    jobs = fresh_project.would_run("guided_evaluation", "--config", f"guided={guided}")
+    assert jobs == {
+        "face_model": 1, "studio_rig_s1_rom": 1, "guided_evaluate": 1, "guided_evaluation": 1,
+    }  # fmt: skip
 
 
 def test_without_a_corrected_frame_only_suggestions_are_made(finished):
