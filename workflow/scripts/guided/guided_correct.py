@@ -49,10 +49,9 @@ def panels(snakemake, face, fit, meshes, shown):
     inputs, params = snakemake.input, snakemake.params
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     options = OverlayConfig(**params.cfg["apply.overlay"])
-    pose = (fit.world_from_head_rotation, fit.world_from_head_translation_mm)
     view = framing(
-        FaceModel.load(inputs.tracker), Identity.load(inputs.identity).neutral_mm, *pose,
-        fit.valid, fit.camera, options.margin, options.panel_height_px,
+        FaceModel.load(inputs.tracker), Identity.load(inputs.identity).neutral_mm, fit,
+        options.margin, options.panel_height_px,
     )  # fmt: skip
     source, rows = open_frames(params.source, *place), fit.index_of(params.frames)
     images = overlay_frames(
