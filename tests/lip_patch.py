@@ -113,7 +113,8 @@ def render(
     model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float = 1.0
 ) -> np.ndarray:
     """Linear image (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
-    key = (vertices.tobytes(), camera.name, tattoo, light)
+    lens = (camera.model, camera.params, camera.width_px, camera.height_px)
+    key = (vertices.tobytes(), *lens, camera.cam_from_world.tobytes(), tattoo, light)
     if key not in _RENDERED:
         _RENDERED[key] = _render(model, vertices, camera, tattoo, light)
     return _RENDERED[key].copy()
