@@ -52,6 +52,7 @@ def check(source, out, frames=FRAMES):
     return out / f"capture/{chunk}.json"
 
 
+@pytest.mark.slow
 def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
     source, out = tmp_path / "capture", tmp_path / "out"
     truth = write_capture(source)

@@ -171,6 +171,7 @@ def test_the_inner_label_of_closed_lips_is_a_line(model, surface, cameras):
     assert area / np.ptp(inner[:, 0]) < 1.0  # px of mean height
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes_whatever_the_chunk(rom, cameras, tmp_path):
     one = {name: cameras[name] for name in ("face2", "lip1")}
     noise = {"name": "s/rom", "seed": 4, "noise_read": 0.001, "noise_shot": 3e-5}

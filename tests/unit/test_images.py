@@ -50,6 +50,7 @@ def test_channels_keep_their_names(tmp_path):
     assert np.abs(back["inner"] - inner).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_image_gives_the_same_bytes_at_another_time(tmp_path):
     linear = np.random.default_rng(0).uniform(0, 1, (16, 16, 3))
     suffixes = (".png", ".jpg", ".tif", ".exr", ".hdr")

@@ -198,6 +198,7 @@ def test_noise_has_the_deviation_asked_for_and_its_seed():
 # The whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", lip_patch.POSES)
 def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opacity, pose):
     vertices = lip_patch.vertices_at(*lip_patch.POSES[pose])
