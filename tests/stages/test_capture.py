@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
 from tests.stages.run_script import run_script
 from tests.unit.small_videos import HEIGHT, scene, write_clip
