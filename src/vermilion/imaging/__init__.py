@@ -1,1 +1,1 @@
-"""What a file's tags say about its images, and how they become plain sRGB or linear images."""
+"""Images and video read and written as they are meant: tags, colours, sampling, drawing."""
