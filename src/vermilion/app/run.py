@@ -53,16 +53,19 @@ def command(configuration: str, skipped: dict[str, str], options: list[str]) -> 
 
 
 def run_all(
-    configuration: str, results: Path, takes: list[Take], options: list[str]
+    configuration: str,
+    results: Path,
+    takes: list[Take],
+    options: list[str],
+    left_out: dict[str, str],
 ) -> tuple[int, dict[str, str]]:
-    """Run until all but the takes that fail is made.
+    """Run until all but the takes that fail, and those that the configuration leaves out, is made.
 
     Returns:
         (exit code of the first run, takes that were left out -> why); raises SystemExit where what
         failed belongs to no take.
     """
-    skipped: dict[str, str] = {}
-    first = 0
+    skipped, first = dict(left_out), 0
     while True:
         clear_failures(results)
         code = subprocess.run(command(configuration, skipped, options), check=False).returncode
@@ -95,7 +98,7 @@ def main(configuration: str, options: list[str]) -> int:
     takes, _ = read_takes(str(raw.get("takes", default["takes"].default)))
     code, skipped = 0, dict(raw.get("skip_takes", {}))
     if options != ["--only-report"]:
-        code, skipped = run_all(configuration, results, takes, options)
+        code, skipped = run_all(configuration, results, takes, options, skipped)
     write_report(configuration, results, skipped)
     print("\n".join(summary(results)))
     if skipped and code:
