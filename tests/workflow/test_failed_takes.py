@@ -1,5 +1,6 @@
 """A take that fails costs itself: everything else is made, and the take is named with its reason."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -8,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vermilion.app.run import clear_failures, failures
+from vermilion.app.run import clear_failures, failures, run_all
 from vermilion.config.takes import read_takes
 from vermilion.imaging.images import write_image
 from vermilion.storage.logfile import FAILED_SUFFIX
@@ -35,6 +36,25 @@ def test_failures_of_chunk_take_and_subject_are_told_apart(tmp_path):
     }
     clear_failures(tmp_path)
     assert failures(tmp_path, takes) == {}
+
+
+def test_takes_left_out_by_hand_stay_out_when_others_fail(tmp_path, monkeypatch):
+    takes, _ = read_takes(str(ROOT / "config" / "takes.tiny.tsv"))
+    commands = []
+
+    def snakemake(words, check):
+        commands.append(words)
+        if len(commands) == 1:
+            failed = tmp_path / "logs" / "tracking" / f"s1-phone.log{FAILED_SUFFIX}"
+            failed.parent.mkdir(parents=True)
+            failed.write_text("no face")
+        return subprocess.CompletedProcess(words, returncode=int(len(commands) == 1))
+
+    monkeypatch.setattr(subprocess, "run", snakemake)
+    code, skipped = run_all("c.yaml", tmp_path, takes, [], {"s2/rom": "by hand"})
+    assert code == 1
+    assert skipped == {"s2/rom": "by hand", "s1/phone": "tracking: no face"}
+    assert commands[-1][-1] == f"skip_takes={json.dumps(skipped)}"
 
 
 @pytest.mark.slow
