@@ -15,7 +15,9 @@ CLIPS = 12
 
 
 def sums(errors, layers=None):
-    found = {"mouth.error": np.array(errors), "mouth.weight": np.ones(len(errors))}
+    ones = np.ones(len(errors))
+    found = {"mouth.error": np.array(errors), "mouth.weight": ones}
+    found |= {"vermilion.motion": np.array(errors), "vermilion.motion_weight": ones}
     if layers is not None:
         found["mouth.feature_square"] = np.array(layers) ** 2
         found["mouth.feature_entries"] = np.ones(len(layers))
@@ -126,15 +128,15 @@ def test_sentences_say_what_the_figures_say():
 def test_sentences_tell_the_motion_from_the_person():
     """Twice the error, all of it in the person: the motion is as good."""
     errors = np.linspace(1.0, 2.0, CLIPS)
-    moving = {"mouth.moving": errors, "mouth.moving_weight": np.ones(CLIPS)}
+    motion = {"vermilion.motion": errors, "vermilion.motion_weight": np.ones(CLIPS)}
     take = {
-        name: ClipSums({**sums(total).sums, **moving})
+        name: ClipSums({**sums(total).sums, **motion})
         for name, total in (("MS/rbf", 2 * errors), ("MS/affine", errors))
     }
     rows = comparisons([(take, 100)], questions_of("kernel"), 200, 0.95, 0)
     (_, sentences), *_ = statements(rows, estimators(CURVES, TABLE1, "kernel"), TABLE1, "kernel")
-    assert "100 % more" in sentences[0]
-    assert "Of the motion alone: 1.50 mm, 1.50 mm, 0 % less (level)." in sentences[0]
+    assert sentences[0].startswith("MS/rbf 1.50 mm, MS/affine 1.50 mm, 0 % less")
+    assert "Vertex error over the mouth: 3.00 mm, 1.50 mm, 100 % more (worse)." in sentences[0]
 
 
 def test_where_an_advantage_is_missing_the_other_figures_are_told():
@@ -151,7 +153,7 @@ def test_where_an_advantage_is_missing_the_other_figures_are_told():
     why = sentences[1]
     assert "in the layers themselves its error on held-out frames is 0 % less (level)" in why
     assert "a linear map explains nearly all" in why
-    assert "the true layers themselves leave 1.00 mm" in why
+    assert "the true layers themselves leave a vertex error of 1.00 mm" in why
 
 
 def test_a_baseline_without_cross_validation_is_not_said_to_equal_the_regressor_in_it():

@@ -20,7 +20,7 @@ KINDS = ("PS", "MS", "GR")
 #: Measure -> the sums whose ratio it is, and whether its root is taken.
 _MEASURES = {
     "vertex_error_mean_mm": ("mouth.error", "mouth.weight", False),
-    "moving_error_mm": ("mouth.moving", "mouth.moving_weight", False),
+    "lip_motion_error_mm": ("vermilion.motion", "vermilion.motion_weight", False),
     "feature_error": ("mouth.feature_square", "mouth.feature_entries", True),
 }
 

@@ -161,29 +161,6 @@ def sums_of_aperture(
     return sums_of_frames("mouth.aperture", difference, clips) + ClipSums(closed)
 
 
-def sums_of_motion_errors(
-    sequence_mm: np.ndarray,
-    reference: Reference,
-    head_rotations: np.ndarray,
-    regions: Regions,
-    clips: np.ndarray,
-) -> ClipSums:
-    """Sums behind `moving_error_mm`: what is left without each vertex's mean offset, head frame.
-
-    The mean offset is what is wrong about the person or the size; the rest, about the motion.
-
-    Args:
-        sequence_mm: (F, V, 3) aligned to the reference.
-        head_rotations: (F, 3, 3) from the reference's world to the head frame.
-        regions: of the V vertices.
-        clips: (F,) clip of each frame.
-    """
-    offset = (sequence_mm - reference.points_mm) @ np.swapaxes(head_rotations, 1, 2)
-    known = np.isfinite(offset)
-    mean = np.where(known, offset, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return sums_by_region("moving", np.linalg.norm(offset - mean, axis=2), regions, clips)
-
-
 def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums:
     """Sums of one figure a frame, values (F,), by clips (F,); NaN frames do not count."""
     known = np.isfinite(values)

@@ -32,6 +32,10 @@ class Regions:
         """(V,) bool: vertices that any region or the alignment needs."""
         return (np.stack(list(self.weights.values())) > 0).any(axis=0) | (self.rest > 0)
 
+    def only(self, *names: str) -> Regions:
+        """Some of the regions, by their names."""
+        return Regions({name: self.weights[name] for name in names}, self.rest)
+
     def restricted(self, valid: np.ndarray) -> Regions:
         """The regions of the valid (V,) bool vertices, those with a counterpart in the truth."""
         weights = {name: np.where(valid, w, 0.0) for name, w in self.weights.items()}

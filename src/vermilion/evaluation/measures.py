@@ -19,13 +19,21 @@ COLUMNS = (
 #: measure, numerator, denominator, unit: the ratio of two sums.
 _RATIOS = (
     ("vertex_error_mean_mm", "error", "weight", "mm"),
-    ("moving_error_mm", "moving", "moving_weight", "mm"),
+    ("lip_motion_error_mm", "motion", "motion_weight", "mm"),
+    ("lip_shape_error_mm", "shape", "shape_weight", "mm"),
+    ("lve_mm2", "lve", "lve_frames", "mm2"),
     ("jitter_mm", "jitter", "jitter_weight", "mm"),
     ("drift_mm", "drift", "drift_weight", "mm"),
     ("aperture_error_mm", "aperture", "aperture_frames", "mm"),
     ("false_open_rate", "false_open", "touch_frames", "1"),
     ("lip_penetration_rate", "through", "through_frames", "1"),
     ("contour_error_px", "contour", "contour_frames", "px per px of inter-ocular distance"),
+)
+#: measure, numerator, denominator: the ratio of two sums over that of the base track.
+_RATIOS_TO_BASE = (
+    ("ratio_to_base", "error", "weight"),
+    ("lip_motion_ratio", "motion", "motion_weight"),
+    ("aperture_ratio", "aperture", "aperture_frames"),
 )
 _QUANTILES = (("surface_error_median_mm", 0.5), ("surface_error_p95_mm", 0.95))
 
@@ -111,10 +119,10 @@ def _figures(of_regressor: ClipSums, base: ClipSums | None, draws: np.ndarray):
             yield "feature_error", region, "1", value, sampled
         if f"{region}.histogram" in sums:
             yield from _surface(sums, region, draws)
-        if base is not None and f"{region}.error" in sums and f"{region}.error" in base.sums:
-            value, sampled = _both(_mean, sums, region, draws)
-            base_value, base_sampled = _both(_mean, base.sums, region, draws)
-            yield "ratio_to_base", region, "1", value / base_value, sampled / base_sampled
+        if base is None:
+            continue
+        for measure, above, below in _RATIOS_TO_BASE:
+            yield from _ratio_to_base(sums, base.sums, measure, region, above, below, draws)
 
 
 def _ratio(sums, measure, region, above, below, unit, draws):
@@ -122,6 +130,19 @@ def _ratio(sums, measure, region, above, below, unit, draws):
     if above in sums:
         value = _divide(sums[above].sum(), sums[below].sum())
         yield measure, region, unit, float(value), _divide(draws @ sums[above], draws @ sums[below])
+
+
+def _ratio_to_base(sums, base, measure, region, above, below, draws):
+    above, below = f"{region}.{above}", f"{region}.{below}"
+    if above in sums and above in base:
+        everything = np.ones((1, draws.shape[1]), dtype=np.int64)
+        whole, sampled = (
+            _divide(
+                _divide(d @ sums[above], d @ sums[below]), _divide(d @ base[above], d @ base[below])
+            )
+            for d in (everything, draws)
+        )
+        yield measure, region, "1", float(whole[0]), sampled
 
 
 def _surface(sums, region, draws):

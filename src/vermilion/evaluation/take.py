@@ -16,11 +16,15 @@ from vermilion.evaluation.errors import (
     sums_of_errors,
     sums_of_frames,
     sums_of_jitter,
-    sums_of_motion_errors,
     surface_errors,
     vertex_errors,
 )
 from vermilion.evaluation.kind_errors import sums_of_kinds
+from vermilion.evaluation.lip_errors import (
+    sums_of_largest_errors,
+    sums_of_motion_errors,
+    sums_of_shape_errors,
+)
 from vermilion.evaluation.lips import (
     LipTolerances,
     aperture_mm,
@@ -110,6 +114,8 @@ def evaluate_take(
         sums[name] = (
             sums_of_errors(errors[name], surface[name], regions, clips)
             + sums_of_motion_errors(sequence, reference, head.rotations, regions, clips)
+            + sums_of_shape_errors(sequence, reference, regions, clips)
+            + sums_of_largest_errors(errors[name], regions, clips)
             + sums_of_jitter(sequence, reference, frames, regions, clips)
             + sums_of_aperture(gaps, true_gaps, clips, tolerances)
             + sums_of_kinds(errors[name], kinds, regions, clips)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-_TRACKING, _MOVING, _LAYERS = "vertex_error_mean_mm", "moving_error_mm", "feature_error"
+_MOTION, _VERTEX, _LAYERS = "lip_motion_error_mm", "vertex_error_mean_mm", "feature_error"
 _WORDS = {"better": "better", "worse": "worse", "level": "level", "unknown": "without interval"}
 
 
@@ -20,14 +20,12 @@ def statements(
     """
     found = []
     for question, rows in comparisons.groupby("question", sort=False):
-        tracking = rows[rows["measure"] == _TRACKING]
-        sentences = [
-            sentence(row) + motion_sentence(row, rows[rows["measure"] == _MOVING])
-            for row in tracking.to_dict("records")
-        ]
+        motion = rows[rows["measure"] == _MOTION].to_dict("records")
+        vertex = rows[rows["measure"] == _VERTEX]
+        sentences = [sentence(row) + vertex_sentence(row, vertex) for row in motion]
         sentences += [
             reason
-            for row in tracking.to_dict("records")
+            for row in motion
             if row["answer"] != "better"
             and (reason := explanation(row, comparisons, estimators, table1, configured))
         ]
@@ -36,7 +34,7 @@ def statements(
 
 
 def sentence(row: dict) -> str:
-    """One comparison of the tracking error in words."""
+    """One comparison of the lip motion in words."""
     change = 100 * (1 - row["ratio"])
     figures = (
         f"{row['first']} {row['first_value']:.2f} mm, {row['second']} {row['second_value']:.2f} mm, "
@@ -56,15 +54,15 @@ def sentence(row: dict) -> str:
     return f"{figures} ({interval}): {verdict}."
 
 
-def motion_sentence(row: dict, moving: pd.DataFrame) -> str:
-    """The same comparison of the motion error, without the static part; may be empty."""
-    same = moving[(moving["first"] == row["first"]) & (moving["second"] == row["second"])]
+def vertex_sentence(row: dict, vertex: pd.DataFrame) -> str:
+    """The same comparison of the vertex error over the mouth, the static part included; may be empty."""
+    same = vertex[(vertex["first"] == row["first"]) & (vertex["second"] == row["second"])]
     if same.empty:
         return ""
     found = same.iloc[0]
     change = 100 * (1 - found["ratio"])
     return (
-        f" Of the motion alone: {found['first_value']:.2f} mm, {found['second_value']:.2f} mm, "
+        f" Vertex error over the mouth: {found['first_value']:.2f} mm, {found['second_value']:.2f} mm, "
         f"{abs(change):.0f} % {'less' if change >= 0 else 'more'} ({_WORDS[found['answer']]})."
     )
 
@@ -76,7 +74,7 @@ def explanation(
     table1: pd.DataFrame,
     configured: str,
 ) -> str:
-    """Why a regressor has no advantage in tracking, by the other figures; may be empty.
+    """Why a regressor has no advantage, by the other figures; may be empty.
 
     Three reasons are possible. The layers do not differ either, because features and layers depend on
     each other nearly linearly, as blend shapes do. Or the layers differ, but the errors of integration
@@ -111,6 +109,6 @@ def explanation(
     ]
     if len(floor) and np.isfinite(floor["mean_mm"].iloc[0]):
         parts.append(
-            f"the true layers themselves leave {floor['mean_mm'].iloc[0]:.2f} mm, the floor of the method"
+            f"the true layers themselves leave a vertex error of {floor['mean_mm'].iloc[0]:.2f} mm, the floor of the method"
         )
     return f"Why, for {kind}: " + "; ".join(parts) + "." if parts else ""

@@ -85,7 +85,7 @@ def test_every_comparison_of_section_6_is_there(tables):
         ("MS", "MS/rbf"), ("GR", "contour"), ("PS", "base"), ("GR/neutral", "GR"),
         ("MS/neutral", "MS"),
     } <= pairs  # fmt: skip
-    assert set(rows["measure"]) == {"vertex_error_mean_mm", "moving_error_mm", "feature_error"}
+    assert set(rows["measure"]) == {"vertex_error_mean_mm", "lip_motion_error_mm", "feature_error"}
     features = read_table(tables / "table2.tsv")
     assert set(features.loc[features["regressor"] == "MS", "features"]) == {
         "shape coefficients", "contour distances", "combined",
