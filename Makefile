@@ -5,9 +5,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 LANDMARKS := $(VENV)-mediapipe.ready
+DOCS := $(VENV)-docs
 RESULTS = $$($(BIN)/python -c 'import sys, yaml; print(yaml.safe_load(open(sys.argv[1])).get("results", "results/demo"))' $(CONFIG))
 
-.PHONY: help setup demo run report verify test test-quick lint format docs clean
+.PHONY: help setup demo run report verify test test-quick lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -15,7 +16,8 @@ help:
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
-	@echo "make docs        regenerate the configuration reference and schemas"
+	@echo "make docs        build the documentation site (results/site); also regenerates the"
+	@echo "                 configuration reference and schemas (make reference: these alone)"
 	@echo "make clean       remove the environment and caches (results stay)"
 
 setup: $(READY) $(LANDMARKS)
@@ -52,6 +54,7 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python tools/check_docstrings.py src
+	$(BIN)/codespell -D - -D tools/words.txt
 	$(BIN)/mypy
 
 format: $(READY)
@@ -59,9 +62,18 @@ format: $(READY)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-docs: $(READY)
+docs: reference $(DOCS)/.ready
+	PYTHONPATH=src NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/mkdocs build --quiet --strict
+	@echo "documentation: results/site/index.html"
+
+reference: $(READY)
 	$(BIN)/python -m vermilion.config.reference
 
+$(DOCS)/.ready: requirements.docs.lock
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check --no-input --require-hashes -r $<
+	@touch $@
+
 clean:
-	rm -rf $(VENV) $(VENV)-mediapipe* .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	rm -rf $(VENV) $(VENV)-mediapipe* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

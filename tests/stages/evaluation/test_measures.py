@@ -33,7 +33,7 @@ def test_corrections_are_between_the_base_and_the_oracle(scene):
     assert error["oracle"] < 0.7 * error["base"]
     for regressor in ("PS-ana", "MS"):
         assert error["oracle"] < error[regressor] < error["base"]
-    # Who it is, is the larger part of a stranger's error, and one frame tells it.
+    # Identity is the larger part of an unseen subject's error; one frame supplies it.
     assert error["GR-ana/neutral"] < 0.9 * error["GR-ana"]
     feature = values(scene.root, "truth", measure="feature_error")
     assert (feature > 0).all()
