@@ -8,11 +8,12 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 RESULTS = $$($(BIN)/python -c 'import sys, yaml; print(yaml.safe_load(open(sys.argv[1])).get("results", "results/demo"))' $(CONFIG))
 
-.PHONY: help setup demo run report verify test test-quick lint format docs reference clean
+.PHONY: help setup demo run sketch report verify test test-quick lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
+	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
@@ -36,6 +37,9 @@ demo: run
 
 run: setup
 	@$(BIN)/python -m vermilion.app.run $(CONFIG) --quiet rules reason host
+
+sketch: $(READY)
+	@$(BIN)/python -m vermilion.app.sketch "$(CONFIG)" "$(TAKE)"
 
 report: $(READY)
 	@$(BIN)/python -m vermilion.app.run $(CONFIG) --only-report

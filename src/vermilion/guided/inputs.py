@@ -13,6 +13,19 @@ from vermilion.guided.sketch import Sketch, read_sketch
 from vermilion.storage.errors import InputError
 
 
+def sketch_cameras(
+    cameras: Mapping[str, Camera], tracked: Camera, of_track: bool
+) -> dict[str, Camera]:
+    """The cameras that sketches of a sequence are drawn in, by name.
+
+    Args:
+        cameras: of the take.
+        tracked: the monocular camera as the tracker used it.
+        of_track: whether the sequence was made in that camera (C, or corrected C), not from the rig.
+    """
+    return {**cameras, tracked.name: tracked if of_track else cameras.get(tracked.name, tracked)}
+
+
 def read_views(
     paths: Sequence[str | Path], cameras: Mapping[str, Camera], frame: int
 ) -> list[tuple[Sketch, Camera]]:

@@ -5,10 +5,10 @@
     {"format": "vermilion sketch", "version": 1, "unit": "px", "camera": "face2", "frame": 120,
      "image_size_px": [512, 640],
      "curves": {"upper_inner": {"kind": "sure", "points": [[210.5, 331.0], ...]},
-                "lower_inner": {"kind": "near", "points": [...]}}}
+                "lower_inner": {"kind": "near", "points": [...], "handles": [...]}}}
 
 Pixels as everywhere: the centre of the top-left pixel is (0.5, 0.5). Curves run along the mouth in
-either direction and are open.
+either direction and are open. Handles are what the page drags; a refinement reads the points alone.
 """
 
 from __future__ import annotations
@@ -47,10 +47,12 @@ class SketchCurve:
     Attributes:
         points_px: (n, 2) image pixels, n >= 2.
         kind: "sure" or "near".
+        handles_px: (k, 2) points by which the page bends the curve; None: it was not drawn there.
     """
 
     points_px: np.ndarray
     kind: str = "sure"
+    handles_px: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,7 @@ def write_sketch(path: str | Path, sketch: Sketch) -> None:
         "camera": sketch.camera,
         "frame": sketch.frame,
         "image_size_px": list(sketch.image_size_px),
-        "curves": {
-            name: {"kind": curve.kind, "points": np.round(curve.points_px, 3).tolist()}
-            for name, curve in sketch.curves.items()
-        },
+        "curves": {name: _curve_json(curve) for name, curve in sketch.curves.items()},
     }
     sketch_of_json(content, path)
     with atomic_path(path) as temporary:
@@ -155,31 +154,20 @@ def sketch_of_json(content: object, path: str | Path | None = None) -> Sketch:
     )  # fmt: skip
 
 
+def _curve_json(curve: SketchCurve) -> dict[str, Any]:
+    content = {"kind": curve.kind, "points": np.round(curve.points_px, 3).tolist()}
+    if curve.handles_px is not None:
+        content["handles"] = np.round(curve.handles_px, 3).tolist()
+    return content
+
+
 def _curve(name: str, curve: object, size: list[int], path: str | Path | None) -> SketchCurve:
     _need(name in CURVE_NAMES, f"a curve named {name!r}", f"one of {', '.join(CURVE_NAMES)}", path)
     what = f"the curve {name}"
     curve = _object(curve, f"{what}, which is ", path)
-    kind, points = curve["kind"], curve["points"]
+    kind, handles = curve["kind"], curve["handles"]
     _need(kind in KINDS, f"{what} of the kind {kind!r}", f"one of {', '.join(KINDS)}", path)
-    _need(isinstance(points, list), f"{what} with {_kind_of(points)} as points", "a list", path)
-    _need(len(points) >= 2, f"{what} with {len(points)} point(s)", "two points or more", path)
-    _need(
-        len(points) <= MOST_POINTS, f"{what} with {len(points)} points",
-        f"at most {MOST_POINTS}", path,
-    )  # fmt: skip
-    for index, point in enumerate(points):
-        good = isinstance(point, list) and len(point) == 2 and all(map(_is_number, point))
-        _need(good, f"{what}, whose point {index} is {point!r:.40}", "[x, y]", path)
-    values = np.array(points, dtype=np.float64)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
-    _need(not len(bad), f"{what}, whose point {bad[:1]} is not finite", "finite pixels", path)
-    outside = np.flatnonzero(
-        ((values < -OUTSIDE_PX) | (values > np.array(size) + OUTSIDE_PX)).any(axis=1)
-    )
-    if len(outside):
-        at = values[outside[0]].tolist()
-        _need(False, f"{what}, whose point {outside[0]} lies at {at}",
-              f"pixels of an image of {size[0]} x {size[1]}", path)  # fmt: skip
+    values = _pixels(what, "point", curve["points"], size, path)
     _need(
         np.ptp(values, axis=0).max() > 0, f"{what}, whose points are all the same",
         "a curve with a length", path,
@@ -188,7 +176,36 @@ def _curve(name: str, curve: object, size: list[int], path: str | Path | None) -
     if crossing is not None:
         _need(False, f"{what}, which crosses itself between the points {crossing[0]} and "
               f"{crossing[1]}", "a curve that does not", path)  # fmt: skip
-    return SketchCurve(values, kind)
+    return SketchCurve(
+        values, kind, None if handles is None else _pixels(what, "handle", handles, size, path)
+    )
+
+
+def _pixels(
+    what: str, part: str, points: object, size: list[int], path: str | Path | None
+) -> np.ndarray:
+    """The points or handles (n, 2) of a curve, checked one by one."""
+    _need(isinstance(points, list), f"{what} with {_kind_of(points)} as {part}s", "a list", path)
+    assert isinstance(points, list)
+    _need(len(points) >= 2, f"{what} with {len(points)} {part}(s)", f"two {part}s or more", path)
+    _need(
+        len(points) <= MOST_POINTS, f"{what} with {len(points)} {part}s",
+        f"at most {MOST_POINTS}", path,
+    )  # fmt: skip
+    for index, point in enumerate(points):
+        good = isinstance(point, list) and len(point) == 2 and all(map(_is_number, point))
+        _need(good, f"{what}, whose {part} {index} is {point!r:.40}", "[x, y]", path)
+    values = np.array(points, dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    _need(not len(bad), f"{what}, whose {part} {bad[:1]} is not finite", "finite pixels", path)
+    outside = np.flatnonzero(
+        ((values < -OUTSIDE_PX) | (values > np.array(size) + OUTSIDE_PX)).any(axis=1)
+    )
+    if len(outside):
+        at = values[outside[0]].tolist()
+        _need(False, f"{what}, whose {part} {outside[0]} lies at {at}",
+              f"pixels of an image of {size[0]} x {size[1]}", path)  # fmt: skip
+    return values
 
 
 def _object(value: object, what: str, path: str | Path | None) -> dict[Any, Any]:

@@ -8,7 +8,7 @@ from vermilion.config.guided import RegionsConfig, SketchRefinementConfig
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
-from vermilion.guided.inputs import read_sculpt, read_views
+from vermilion.guided.inputs import read_sculpt, read_views, sketch_cameras
 from vermilion.guided.overlay import draw_refinement
 from vermilion.guided.refined_frame import RefinedFrame
 from vermilion.guided.refinement import RefinementSettings, SketchRefiner
@@ -29,11 +29,9 @@ OFF_PX = 1.0
 
 def cameras_of(snakemake):
     """The take's cameras; the tracked one as the tracker used it, where the sequence is its own."""
-    cameras = read_cameras(snakemake.input.cameras)
     tracked = TrackedTake.load(snakemake.input.fit).camera
-    if snakemake.params.tracked or tracked.name not in cameras:
-        cameras[tracked.name] = tracked
-    return cameras, tracked
+    cameras = read_cameras(snakemake.input.cameras)
+    return sketch_cameras(cameras, tracked, snakemake.params.tracked), tracked
 
 
 def quality_row(frame, refined):

@@ -1,0 +1,165 @@
+"""Where the files of one guided take lie, as the configuration and the workflow say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from vermilion.config.guided import GuidedConfig
+from vermilion.config.load import load_configuration
+from vermilion.config.root import Configuration
+from vermilion.config.skip import without_skipped
+from vermilion.config.takes import STUDIO, Take
+from vermilion.imaging.source import Source, folder_of
+from vermilion.storage.errors import ConfigurationError, InputError
+
+#: The workflow's own list of paths, which is plain Python.
+PATHS = Path("workflow/rules/paths.smk")
+
+
+@dataclass(frozen=True)
+class TakeFiles:
+    """One take of `guided.takes`, and the files that the page reads and writes.
+
+    Attributes:
+        configuration: path of the configuration, as Snakemake gets it.
+        take: its row.
+        sequence: what is corrected: `corrected`, `base` or `H`.
+        guided: the section of the configuration.
+        source: of the images.
+        labels: folder of the sketches.
+        face, neutral: model of the topology, the person's neutral in it.
+        sequence_pattern, guided_pattern, maps_pattern, quality_pattern, refined_pattern: patterns with
+            `*` for the chunk or frame.
+        fit, cameras, suggestions, overlay: files of the take.
+        results: folder of all results.
+    """
+
+    configuration: str
+    take: Take
+    sequence: str
+    guided: GuidedConfig
+    source: Source
+    labels: Path
+    face: Path
+    neutral: Path
+    sequence_pattern: Path
+    guided_pattern: Path
+    maps_pattern: Path
+    quality_pattern: Path
+    refined_pattern: Path
+    fit: Path
+    cameras: Path
+    suggestions: Path
+    overlay: Path
+    results: Path
+
+    @classmethod
+    def of(cls, configuration: str, name: str, paths: Path = PATHS) -> TakeFiles:
+        """Of the take `subject/take` of a configuration.
+
+        Raises:
+            ConfigurationError: a faulty configuration.
+            InputError: no such configuration, or a take that it does not correct.
+        """
+        config, takes = read_configuration(configuration)
+        if name not in config.guided.takes:
+            named = ", ".join(config.guided.takes) or "no take"
+            raise InputError(
+                f"the take {name!r}, while `guided.takes` names {named}",
+                "one of these takes",
+                f"Say TAKE=subject/take, or add `guided: {{takes: {{{name}: base}}}}`.",
+                path=configuration,
+            )
+        take = next(take for take in takes if take.name == name)
+        sequence = config.guided.takes[name]
+        patterns = _results_paths(paths, config)
+
+        def fill(pattern: str) -> Path:
+            place = {"subject": take.subject, "take": take.take}
+            return Path(pattern.format(**place, chunk="*", frame="*"))
+
+        own_tracker = take.subject in config.tracking.scans
+        tracker = patterns.own_tracker if own_tracker else patterns.tracker
+        of_sequence = {
+            "base": patterns.coarse, "corrected": patterns.corrected, "H": patterns.accurate,
+        }  # fmt: skip
+        source = _source(take, config, str(fill(patterns.capture_folder)))
+        is_rig = sequence == "H"
+        return cls(
+            configuration, take, sequence, config.guided, source, folder_of(source, "labels"),
+            fill(patterns.template if is_rig else tracker),
+            fill(patterns.neutral if is_rig else patterns.identity),
+            fill(of_sequence[sequence]), fill(patterns.guided_chunk), fill(patterns.maps),
+            fill(patterns.guided_quality), fill(patterns.refined), fill(patterns.fit),
+            fill(patterns.cameras), fill(patterns.suggestions), fill(patterns.guided_overlay),
+            Path(config.results),
+        )  # fmt: skip
+
+    @property
+    def sequence_chunks(self) -> list[Path]:
+        """Chunks of the sequence that exist."""
+        return existing(self.sequence_pattern)
+
+    @property
+    def guided_chunks(self) -> list[Path]:
+        """Chunks of the propagated sequence that exist."""
+        return existing(self.guided_pattern)
+
+    @property
+    def targets(self) -> list[str]:
+        """What the workflow is asked for when the page propagates."""
+        return [str(self.suggestions), str(self.overlay)]
+
+    def refined(self, frame: int) -> Path:
+        """The workflow's refinement of a frame."""
+        return self.refined_pattern.with_name(
+            self.refined_pattern.name.replace("*", f"{frame:06d}")
+        )
+
+
+def existing(pattern: Path) -> list[Path]:
+    """Files of a pattern whose last part has a `*`, ascending."""
+    return sorted(pattern.parent.glob(pattern.name))
+
+
+def read_configuration(path: str) -> tuple[Configuration, list[Take]]:
+    """The checked configuration and take sheet of a file, without the takes that it leaves out."""
+    try:
+        raw = yaml.safe_load(Path(path).read_text(encoding="utf-8")) or {}
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(
+            f"no readable configuration ({error})", "a YAML file", "Say CONFIG=config/yours.yaml.",
+            path=path,
+        ) from error  # fmt: skip
+    if not isinstance(raw, dict):
+        raise ConfigurationError([f"{path}: found no keys; expected a configuration."])
+    return without_skipped(*load_configuration(raw, path))
+
+
+def _results_paths(paths: Path, config: Configuration) -> Any:
+    """The class `P` of the workflow's paths for a configuration."""
+    names: dict[str, Any] = {"CONFIG": config}
+    try:
+        text = paths.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            "no workflow in this folder", f"the file {paths}", "Start it in Vermilion's folder."
+        ) from error
+    exec(compile(text, str(paths), "exec"), names)
+    return names["P"]
+
+
+def _source(take: Take, config: Configuration, capture_folder: str) -> Source:
+    """Where the images lie, as `source_of` of the workflow says it."""
+    if take.source == STUDIO:
+        return capture_folder
+    capture = config.capture
+    if not (capture.exr_layer or capture.colour_space):
+        return take.source
+    return {
+        "path": take.source, "exr_layer": capture.exr_layer, "colour_space": capture.colour_space,
+    }  # fmt: skip
