@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.evaluation_face import sheet_face
+from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.objs import write_obj
 from vermilion.export.overlay import (
     SKIN,
@@ -19,6 +20,7 @@ from vermilion.export.usd import CAMERA_PATH, MESH_PATH, write_usd
 from vermilion.export.weights import write_weights
 from vermilion.geometry.camera import pinhole
 from vermilion.geometry.mesh_files import read_mesh
+from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.video import VideoReader, write_video
 
 
@@ -28,6 +30,15 @@ def sequence(frames: int = 4) -> tuple[np.ndarray, np.ndarray]:
     return model.neutral_mm + steps * [0.0, 0.5, 0.0] + [0.0, 0.0, 600.0], model.triangles
 
 
+def animation(frames, vertices, triangles, camera, unit_mm=1.0) -> Animation:
+    still = HeadFrame(np.tile(np.eye(3), (len(frames), 1, 1)), np.zeros((len(frames), 3)))
+    none = NamedShapes((), np.zeros((0, *vertices[0].shape)), np.zeros((len(frames), 0)))
+    return Animation(
+        np.asarray(frames), 25.0, vertices, Polygons.of_triangles(triangles), vertices[0], still,
+        none, unit_mm, camera=camera,
+    )  # fmt: skip
+
+
 def test_usd_round_trip_in_millimetres_and_frames(tmp_path):
     from pxr import Usd, UsdGeom
 
@@ -35,7 +46,7 @@ def test_usd_round_trip_in_millimetres_and_frames(tmp_path):
     frames = np.array([10, 11, 12, 15])
     camera = pinhole("cam", 1500.0, 640, 480)
     path = tmp_path / "corrected.usdc"
-    write_usd(path, frames, vertices, triangles, 25.0, camera)
+    write_usd(path, animation(frames, vertices, triangles, camera))
     stage = Usd.Stage.Open(str(path))
     assert UsdGeom.GetStageMetersPerUnit(stage) == pytest.approx(0.001)
     assert stage.GetTimeCodesPerSecond() == 25.0
@@ -48,21 +59,25 @@ def test_usd_round_trip_in_millimetres_and_frames(tmp_path):
     assert (ids == triangles).all()
 
 
-def test_usd_camera_sees_what_our_camera_sees(tmp_path):
+@pytest.mark.parametrize("unit_mm", [1.0, 10.0])
+def test_usd_camera_sees_what_our_camera_sees(tmp_path, unit_mm):
     from pxr import Gf, Usd, UsdGeom
 
     vertices, triangles = sequence(1)
     camera = pinhole("cam", 1500.0, 640, 480)
     camera = type(camera)("cam", "PINHOLE", (1500.0, 1500.0, 300.0, 260.0), 640, 480, np.eye(3, 4))
     path = tmp_path / "a.usdc"
-    write_usd(path, np.array([0]), vertices, triangles, 25.0, camera)
+    write_usd(path, animation([0], vertices, triangles, camera, unit_mm))
     stage = Usd.Stage.Open(str(path))
     prim = UsdGeom.Camera(stage.GetPrimAtPath(CAMERA_PATH))
+    tenth_mm = unit_mm / 10  # a tenth of a stage unit, in which apertures are
+    assert prim.GetHorizontalApertureAttr().Get() * tenth_mm == pytest.approx(36.0)
+    assert prim.GetFocalLengthAttr().Get() * tenth_mm == pytest.approx(1500 * 36 / 640)
     frustum = prim.GetCamera(0.0).frustum
     view = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
     world = UsdGeom.Xformable(stage.GetPrimAtPath(MESH_PATH)).ComputeLocalToWorldTransform(0.0)
     for point in vertices[0][::97]:
-        seen = view.Transform(world.Transform(Gf.Vec3d(*point.tolist())))
+        seen = view.Transform(world.Transform(Gf.Vec3d(*(point / unit_mm).tolist())))
         pixel = [(seen[0] + 1) / 2 * 640, (1 - seen[1]) / 2 * 480]
         assert np.abs(np.array(pixel) - camera.project(point)).max() < 0.05
 
@@ -71,7 +86,8 @@ def test_usd_is_upright_for_a_video_whose_world_is_its_camera(tmp_path):
     from pxr import Gf, Usd, UsdGeom
 
     vertices, triangles = sequence(1)
-    write_usd(tmp_path / "a.usdc", np.array([0]), vertices, triangles, 25.0, pinhole("c", 9, 8, 8))
+    camera = pinhole("c", 9, 8, 8)
+    write_usd(tmp_path / "a.usdc", animation([0], vertices, triangles, camera))
     stage = Usd.Stage.Open(str(tmp_path / "a.usdc"))
     root = UsdGeom.Xformable(stage.GetPrimAtPath("/Face")).ComputeLocalToWorldTransform(0.0)
     assert root.TransformDir(Gf.Vec3d(0, -1, 0))[1] == pytest.approx(1.0)  # the image's up

@@ -19,8 +19,19 @@ def apply_neutral(wildcards):
     return {"neutral_pair": neutral_pair_of(wildcards.subject), **neutral_of_take(wildcards)}
 
 
+#: Format -> its file or folder among those of a corrected take.
+EXPORTED = {
+    "usd": "/corrected.usdc",
+    "usd_shapes": "/corrected_shapes.usdc",
+    "gltf": "/corrected.glb",
+    "alembic": "/corrected.abc",
+    "obj": "/obj",
+    "ply": "/ply",
+}
+
+
 def exports_to(folder, overlay, timeline, category):
-    """Outputs of a corrected take in a folder; USD and OBJ as the configuration asks."""
+    """Outputs of a corrected take in a folder, in the formats that the configuration asks for."""
     outputs = {
         "corrected": folder + "/corrected.npy",
         "mesh": folder + "/mesh.ply",
@@ -28,11 +39,30 @@ def exports_to(folder, overlay, timeline, category):
         "overlay": in_report(overlay, category, "overlay", take="{subject}/{take}"),
         "timeline": in_report(timeline, category, "timeline", take="{subject}/{take}, time line"),
     }
-    if CONFIG.apply.export.usd:
-        outputs["usd"] = folder + "/corrected.usdc"
-    if CONFIG.apply.export.obj:
-        outputs["obj"] = directory(folder + "/obj")
+    options = CONFIG.apply.export
+    for name in options.formats:
+        path = folder + EXPORTED[name]
+        outputs[name] = path if "." in EXPORTED[name] else directory(path)
+    if options.topology == "full":
+        outputs["full"] = folder + "/full.npy"
+    if options.plate:
+        outputs["plate"] = directory(folder + "/plate")
+    if CONFIG.tracking.image_fit.enabled:
+        outputs["albedo"] = folder + "/albedo.png"
     return outputs
+
+
+def exports_need(wildcards):
+    """What the exported files need beyond the corrected chunks (use with `unpack`)."""
+    needed = {"identity": P.identity.format(subject=wildcards.subject)}
+    options = CONFIG.apply.export
+    if options.topology == "full":
+        needed["studio"] = P.studio_model
+    if options.plate:
+        needed["images"] = mono_images(wildcards)
+    if CONFIG.tracking.image_fit.enabled:
+        needed["appearance"] = P.appearance.format(**wildcards)
+    return needed
 
 
 def chunks_around(pattern):
@@ -88,6 +118,7 @@ rule apply:
 rule apply_export:
     """Joins the chunks of a take into the files that Blender, Maya or Unreal open."""
     input:
+        unpack(exports_need),
         tracker=tracker_of,
         fit=P.fit,
         corrected=per_chunk(P.corrected),
@@ -106,6 +137,7 @@ rule apply_export:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),
         fps=take_fps,
+        source=mono_source,
     script:
         "../scripts/apply/apply_export.py"
 

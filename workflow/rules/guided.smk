@@ -205,6 +205,7 @@ rule guided_correct:
 rule guided_export:
     """Joins the chunks of a take into the files that `apply` exports, in guided/."""
     input:
+        unpack(exports_need),
         tracker=guided_face,
         fit=P.fit,
         corrected=per_chunk(P.guided_chunk),
@@ -223,5 +224,6 @@ rule guided_export:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),
         fps=take_fps,
+        source=mono_source,
     script:
         "../scripts/apply/apply_export.py"

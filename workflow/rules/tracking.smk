@@ -411,6 +411,7 @@ rule tracked_meshes:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_meshes"),
         frames=chunk_frames,
+        fps=take_fps,
     script:
         "../scripts/tracking/tracked_meshes.py"
 
@@ -435,6 +436,7 @@ rule tracked_topology:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_topology"),
         first=first_frame,
+        fps=take_fps,
     script:
         "../scripts/tracking/tracked_topology.py"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from vermilion.config.base import StageConfig, section
@@ -9,14 +11,42 @@ from vermilion.config.base import StageConfig, section
 HEX = r"^#[0-9a-fA-F]{6}$"
 
 
-class ExportConfig(StageConfig):
-    """Files that other programs open."""
+ExportFormat = Literal["usd", "usd_shapes", "gltf", "alembic", "obj", "ply"]
 
-    obj: bool = Field(
-        False, description="Also write one OBJ a frame (`obj/<frame>.obj`, millimetres)."
+
+class ExportConfig(StageConfig):
+    """Files that other programs open (docs/interchange.md)."""
+
+    formats: list[ExportFormat] = Field(
+        ["usd"],
+        description="Files beside `corrected.npy`: `usd` (`corrected.usdc`, a point cache), `usd_shapes` "
+        "(`corrected_shapes.usdc`, blend shapes of UsdSkel), `gltf` (`corrected.glb`, morph targets), "
+        "`alembic` (`corrected.abc`, needs the optional package `alembic3d`), `obj` and `ply` (a folder "
+        "with a file a frame).",
     )
-    usd: bool = Field(
-        True, description="Write `corrected.usdc` with one time sample a frame (millimetres)."
+    topology: Literal["tracker", "full"] = Field(
+        "tracker",
+        description="Mesh of the files: the tracker's, or the full face model with quads, eyes, teeth "
+        "and neck (also written as `full.npy`).",
+    )
+    unit_mm: float = Field(
+        1.0,
+        gt=0,
+        le=1e6,
+        description="Length of a unit in USD, Alembic, OBJ and PLY files (mm): 10 for centimetres. glTF "
+        "is in metres, `.npy` in millimetres.",
+    )
+    tolerance_mm: float = Field(
+        0.02,
+        gt=0,
+        le=10,
+        description="How far blend shapes may be from the corrected mesh (mm, farthest vertex of the "
+        "take). Smaller values need more corrective shapes.",
+    )
+    plate: bool = Field(
+        False,
+        description="Also write the take's images without lens distortion (`plate/<frame>.jpg`), and "
+        "set them behind the head in USD files.",
     )
 
 

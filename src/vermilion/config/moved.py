@@ -20,11 +20,14 @@ MOVED = {
 }
 
 _AS_DRAWN = "Contour labels count as drawn now; none is moved or left out."
+_FORMATS = "The formats are one list now, `apply.export.formats`, such as `[usd, obj]`."
 
 #: Keys that are gone -> the reason.
 REMOVED = {
     "contours.detector.label_tolerance": _AS_DRAWN,
     "contours.detector.label_reach": _AS_DRAWN,
+    "apply.export.usd": _FORMATS,
+    "apply.export.obj": _FORMATS,
 }
 
 

@@ -151,7 +151,17 @@ class ExternalConfig(StageConfig):
         None,
         gt=0,
         le=1e6,
-        description="Length of a unit in the files (mm). Empty: the unit of a USD file, 1 for the others.",
+        description="Length of a unit in the files (mm). Empty: the unit that the file names, else a guess "
+        "from the size of the mesh, which the log tells.",
+    )
+    up: Literal["y", "z"] | None = Field(
+        None,
+        description="Axis of the files that points up: a sequence with `z` up is turned to y up. Empty: "
+        "it is left as it is.",
+    )
+    mesh: str | None = Field(
+        None,
+        description="Path or name of the mesh in files that have several. Empty: the only one that moves.",
     )
 
 

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from vermilion.geometry.mesh import Mesh
+from vermilion.geometry.obj_file import read_obj
+from vermilion.geometry.ply_file import read_ply
+from vermilion.geometry.polygons import Polygons
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 
-MESH_SUFFIXES = (".obj", ".ply")
+MESH_SUFFIXES = (".obj", ".ply", ".stl")
 
 
 def write_ply(path: str | Path, mesh: Mesh, colours: np.ndarray | None = None) -> None:
@@ -48,3 +51,35 @@ def read_mesh(path: str | Path) -> Mesh:
             f"an unreadable mesh ({error})", "PLY or OBJ", "Export the mesh again.", path=path
         ) from error
     return Mesh(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))
+
+
+def read_polygons(path: str | Path) -> tuple[np.ndarray, Polygons]:
+    """Vertices (V, 3) and polygons of an OBJ, PLY or STL, as the file has them and in its order.
+
+    An STL has three vertices a triangle, which nothing joins.
+
+    Raises:
+        InputError: the file is unreadable or has no face.
+    """
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".obj":
+            vertices, polygons = read_obj(path)
+        elif path.suffix.lower() == ".ply":
+            vertices, polygons = read_ply(path)
+        else:
+            mesh = read_mesh(path)
+            vertices, polygons = mesh.vertices_mm, Polygons.of_triangles(mesh.triangles)
+        if len(polygons) == 0:
+            raise ValueError("no face")
+        if polygons.corners.min() < 0 or polygons.corners.max() >= len(vertices):
+            raise ValueError(f"a face with a vertex beyond the {len(vertices)} there are")
+    except (OSError, ValueError, IndexError, KeyError) as error:
+        raise InputError(
+            f"an unreadable mesh ({error})", "OBJ, PLY or STL", "Export the mesh again.", path=path
+        ) from error
+    if not np.isfinite(vertices).all():
+        raise InputError(
+            "vertices that are not finite", "numbers", "Export the mesh again.", path=path
+        )
+    return vertices, polygons

@@ -17,7 +17,7 @@ from tests.stages.test_correction import (
     run_neutral_pair,
     run_train,
 )
-from vermilion.config.apply import OverlayConfig
+from vermilion.config.apply import ExportConfig, OverlayConfig
 from vermilion.config.correction import ImageAgreementConfig
 from vermilion.config.evaluation import (
     ContourConfig,
@@ -41,7 +41,9 @@ CFG = {
     "correction.integration": {"seam_mm": 8.0, "detail_mm": 15.0},
     "correction.image": ImageAgreementConfig().model_dump(),
     "apply.overlay": OverlayConfig(panel_height_px=160).model_dump(),
-    "apply.export": {"obj": True, "usd": True},
+    "apply.export": ExportConfig(
+        formats=["usd", "usd_shapes", "gltf", "obj", "ply"], plate=True
+    ).model_dump(),
 }
 
 

@@ -10,12 +10,13 @@ import pytest
 from tests.stages.evaluation.conftest import CFG, SUBJECT
 from tests.stages.lip_scene import BAD_FRAME, CHUNKS
 from tests.stages.run_script import run_script
-from vermilion.geometry.mesh_files import read_mesh
+from vermilion.config.apply import ExportConfig
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
+from vermilion.tracking.external.read import read_tracked
 
 pytestmark = pytest.mark.slow
 
@@ -74,10 +75,11 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
     run_script(
         "apply/apply_export",
         wildcards={"subject": SUBJECT, "take": "rom"},
-        params={"cfg": CFG, "fps": 25.0},
+        params={"cfg": CFG, "fps": 25.0, "source": str(images)},
         input={
             "tracker": scene.root / "face/tracker.npz",
             "fit": out / "fit.npz",
+            "identity": scene.root / f"subjects/{SUBJECT}/identity.npz",
             "corrected": [tmp_path / f"parts/{part}.npy" for part in parts],
             "overlays": [tmp_path / f"parts/{part}.mp4" for part in parts],
             "quality": [tmp_path / f"parts/{part}.tsv" for part in parts],
@@ -87,14 +89,20 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
             for name, file in {
                 "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
                 "overlay": "overlay.mp4", "usd": "corrected.usdc", "obj": "obj",
-                "timeline": "timeline.png",
+                "timeline": "timeline.png", "usd_shapes": "corrected_shapes.usdc",
+                "gltf": "corrected.glb", "ply": "ply", "plate": "plate",
             }.items()
         },
     )  # fmt: skip
     assert VideoReader(out / "overlay.mp4").n_frames == 12
     assert len(pd.read_csv(out / "weights.csv")) == 12
     assert cv2.imread(str(out / "timeline.png")).shape[1] > 500
-    assert (out / "corrected.usdc").stat().st_size > 1000
+    assert len(list((out / "plate").glob("*.jpg"))) == 11  # all images that there are
+    exact_mm, shapes_mm = 1e-4, ExportConfig().tolerance_mm + 1e-3
+    for file, limit in {
+        "corrected.usdc": exact_mm, "obj": exact_mm, "ply": exact_mm, "corrected_shapes.usdc": shapes_mm,
+        "corrected.glb": shapes_mm,
+    }.items():  # fmt: skip
+        back = read_tracked(out / file, range(12))
+        assert np.linalg.norm(back.vertices_mm - at_once, axis=2).max() < limit, file
     assert len(list((out / "obj").glob("*.obj"))) == 12
-    mesh = read_mesh(out / "obj/000003.obj")
-    assert np.abs(mesh.vertices_mm - at_once[3]).max() < 1e-3

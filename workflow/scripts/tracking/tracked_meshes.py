@@ -2,17 +2,22 @@
 
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import write_sequence
-from vermilion.tracking.external import read_tracked
+from vermilion.tracking.external.read import read_tracked
 
 
 def main(snakemake):
+    params = snakemake.params
     sequence = read_tracked(
         snakemake.input.source,
-        snakemake.params.frames,
-        snakemake.params.cfg["tracking.external"]["unit_mm"],
+        params.frames,
+        **params.cfg["tracking.external"],
+        fps=params.fps,
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )
+    print(*sequence.understood, sep="\n")
+    for frame, reason in sorted(sequence.lost.items()):
+        print(f"frame {frame}: {reason}")
     write_sequence(snakemake.output.meshes, sequence.vertices_mm)
 
 

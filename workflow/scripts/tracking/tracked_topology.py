@@ -3,14 +3,15 @@
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.external import read_tracked
+from vermilion.tracking.external.read import read_tracked
 
 
 def main(snakemake):
     sequence = read_tracked(
         snakemake.input.source,
         [snakemake.params.first],
-        snakemake.params.cfg["tracking.external"]["unit_mm"],
+        **snakemake.params.cfg["tracking.external"],
+        fps=snakemake.params.fps,
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )

@@ -1,0 +1,90 @@
+"""A mesh sequence with all that a file of another program says of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vermilion.geometry.camera import Camera
+from vermilion.geometry.polygons import Polygons
+
+
+@dataclass(frozen=True)
+class HeadFrame:
+    """Pose of the head in every frame: world = rotation @ head + translation.
+
+    Attributes:
+        rotation: (F, 3, 3) world from head.
+        translation_mm: (F, 3).
+    """
+
+    rotation: np.ndarray
+    translation_mm: np.ndarray
+
+    def to_head(self, row: int, vertices_mm: np.ndarray) -> np.ndarray:
+        """The `vertices_mm` (V, 3) of frame `row`, world, in the head frame."""
+        return (vertices_mm - self.translation_mm[row]) @ self.rotation[row]
+
+    def to_world(self, row: int, vertices_mm: np.ndarray) -> np.ndarray:
+        """The `vertices_mm` (V, 3) of the head frame in the world of frame `row`."""
+        return vertices_mm @ self.rotation[row].T + self.translation_mm[row]
+
+
+@dataclass(frozen=True)
+class NamedShapes:
+    """Blend shapes and their weights.
+
+    Attributes:
+        names: K names.
+        shapes_mm: (K, V, 3) displacements at weight 1, head frame.
+        weights: (F, K).
+    """
+
+    names: tuple[str, ...]
+    shapes_mm: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class Animation:
+    """What is exported of a take.
+
+    Attributes:
+        frames: (F,) increasing frame numbers.
+        fps: frames a second.
+        vertices_mm: (F, V, 3) world; memory-mapped where it is long. A frame that is not finite
+            has no mesh, and is left out of the files.
+        polygons: of the V vertices.
+        neutral_mm: (V, 3) the person's neutral, head frame.
+        head: pose of the head in every frame.
+        shapes: of the base track: what the named blend shapes contribute.
+        unit_mm: length of a unit in the files.
+        uv: (V, 2), v up; None: the mesh has none.
+        camera: of the plate; None: no camera is written.
+        albedo: texture file, relative to the exported files; None: none.
+        plate: pattern of undistorted image files, relative, with `{frame}`; None: none.
+    """
+
+    frames: np.ndarray
+    fps: float
+    vertices_mm: np.ndarray
+    polygons: Polygons
+    neutral_mm: np.ndarray
+    head: HeadFrame
+    shapes: NamedShapes
+    unit_mm: float
+    uv: np.ndarray | None = None
+    camera: Camera | None = None
+    albedo: str | None = None
+    plate: str | None = None
+
+    @property
+    def rows(self) -> list[int]:
+        """Rows of the frames that have a mesh."""
+        return [row for row in range(len(self.frames)) if np.isfinite(self.vertices_mm[row]).all()]
+
+    @property
+    def turned_upright(self) -> bool:
+        """Whether the world's y points down (an uncalibrated video's world is its camera)."""
+        return self.camera is not None and bool(self.camera.rotation[1, 1] > 0)

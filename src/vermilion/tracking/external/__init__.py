@@ -1,0 +1,1 @@
+"""Mesh sequences of other trackers: folders of meshes, `.npz`, USD, Alembic, glTF."""
