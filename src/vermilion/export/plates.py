@@ -22,7 +22,9 @@ def write_plates(
     read: Callable[[int], np.ndarray],
     suffix: str = ".jpg",
 ) -> None:
-    """Write `<frame:06d>.jpg` of every frame that can be read.
+    """Write `<frame:06d>.jpg` of every frame that can be read, with square pixels.
+
+    They are the images of `straight_camera(camera, square=True)`.
 
     Args:
         folder: to be written, whole or not at all.
@@ -34,7 +36,7 @@ def write_plates(
     with atomic_folder(folder) as temporary:
         for frame in progress(list(frames), "plates"):
             try:
-                image = undistorted(read(int(frame)), camera)[0]
+                image = undistorted(read(int(frame)), camera, square=True)[0]
             except InputError:
                 continue
             write_srgb8(temporary / f"{int(frame):06d}{suffix}", image)

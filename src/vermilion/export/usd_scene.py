@@ -117,7 +117,11 @@ def add_plate(stage: Any, animation: Animation) -> None:
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype=np.float32)[::-1]
     st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(uv)))
-    files = {float(frame): plate.format(frame=int(frame)) for frame in animation.frames}
+    files: dict[Any, str] = {
+        float(frame): plate.format(frame=int(frame)) for frame in animation.frames
+    }
+    # Programs that read no animated textures show the first image.
+    files[Usd.TimeCode.Default()] = plate.format(frame=int(animation.frames[0]))
     material = _textured(stage, PLATE_MATERIAL_PATH, files, emits=True)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
     prim = stage.GetPrimAtPath(CAMERA_PATH)

@@ -24,6 +24,7 @@ from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.imaging.undistortion import straight_camera
 from vermilion.storage.files import atomic_path
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -92,7 +93,10 @@ def add_images(snakemake, animation, face, full, options):
             out.plate, animation.frames, camera,
             lambda frame: to_display(source.read(camera.name, frame)),
         )  # fmt: skip
-        animation = replace(animation, plate=Path(out.plate).name + "/{frame:06d}.jpg")
+        animation = replace(
+            animation, camera=straight_camera(camera, square=True),
+            plate=Path(out.plate).name + "/{frame:06d}.jpg",
+        )  # fmt: skip
     return animation
 
 
