@@ -7,13 +7,19 @@ def apply_regressor(wildcards):
 
 
 def apply_model(wildcards):
-    """File of that regressor."""
-    return P.model.format(regressor=apply_regressor(wildcards))
+    """File of that regressor, or of one that was trained elsewhere; none for `regressor: none`."""
+    if CONFIG.apply.model:
+        return CONFIG.apply.model
+    return P.model.format(regressor=apply_regressor(wildcards)) if CONFIG.apply.trains else []
 
 
 def apply_neutral(wildcards):
     """Neutrals that tell a regressor what it does not know: the person's, the take's (`unpack`)."""
-    known = wildcards.subject in trained_on(apply_regressor(wildcards), trained_subjects())
+    if not (CONFIG.apply.trains or CONFIG.apply.model):
+        return {}
+    known = CONFIG.apply.trains and wildcards.subject in trained_on(
+        apply_regressor(wildcards), trained_subjects()
+    )
     if known or not takes("tattoo", wildcards.subject):
         return neutral_of_take(wildcards)
     return {"neutral_pair": neutral_pair_of(wildcards.subject), **neutral_of_take(wildcards)}
@@ -28,6 +34,9 @@ EXPORTED = {
     "obj": "/obj",
     "ply": "/ply",
 }
+
+#: Without a regressor, which has a mask of its own, the mask is that of the correspondence.
+MASK_KEYS = () if CONFIG.apply.trains or CONFIG.apply.model else ("correspondence",)
 
 
 def exports_to(folder, overlay, timeline, category):
@@ -105,7 +114,7 @@ rule apply:
         mem_mb=1500,
         runtime=60,
     params:
-        cfg=cfg_of("apply.overlay", "correction.integration", "correction.image"),
+        cfg=cfg_of("apply.overlay", "correction.integration", "correction.image", *MASK_KEYS),
         code=code_of("apply/apply"),
         frames=chunk_frames,
         fps=take_fps,
@@ -140,6 +149,45 @@ rule apply_export:
         source=mono_source,
     script:
         "../scripts/apply/apply_export.py"
+
+
+def how_applied(wildcards):
+    """What moved the lips, as the page of a take says it."""
+    if CONFIG.apply.model:
+        return f"The lips were corrected by the regressor {Path(CONFIG.apply.model).name}."
+    if CONFIG.apply.trains:
+        return f"The lips were corrected by the regressor {apply_regressor(wildcards)}."
+    return "The lips of the track follow the contours in the image; no regressor was applied."
+
+
+rule lips_page:
+    """Puts the video beside its result, the warnings and the files on one page: lips.html."""
+    input:
+        **({"usd": P.applied + "/corrected.usdc"} if CONFIG.apply.export.usd else {}),
+        tracker=tracker_of,
+        fit=P.fit,
+        quality=P.quality,
+        corrected=P.applied + "/corrected.npy",
+        mesh=P.applied + "/mesh.ply",
+        weights=P.applied + "/weights.csv",
+        overlay=P.apply_overlay,
+    output:
+        page=P.lips_page,
+    log:
+        P.log("lips_page", "take"),
+    benchmark:
+        P.benchmark("lips_page", "take")
+    resources:
+        mem_mb=1500,
+        runtime=20,
+    params:
+        code=code_of("apply/lips_page"),
+        fps=take_fps,
+        how=how_applied,
+        only=len(TAKES) == 1,
+        configuration=ORIGIN,
+    script:
+        "../scripts/apply/lips_page.py"
 
 
 rule makeup:

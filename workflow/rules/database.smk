@@ -4,7 +4,7 @@
 def database_takes():
     """Takes with an accurate mesh; the sheet's split says which frames train."""
     found = takes("tattoo")
-    if not found:
+    if not found and CONFIG.apply.trains:
         raise WorkflowError(
             f"{CONFIG.takes}: found no take of role `tattoo`; expected at least one. There is "
             "nothing to learn from without an accurate mesh."

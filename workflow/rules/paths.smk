@@ -170,6 +170,7 @@ class P:
     apply_quality = _APPLY + "/quality/{chunk}.tsv"
     apply_overlay = _APPLY + "/overlay.mp4"
     timeline = _APPLY + "/timeline.png"
+    lips_page = _APPLY + "/lips.html"
     makeup = _APPLY + "/makeup.mp4"
     makeup_chunk = _APPLY + "/makeup/{chunk}"
 

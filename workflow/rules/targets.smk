@@ -64,6 +64,18 @@ def evaluation_outputs():
     )
 
 
+def study_outputs():
+    """What is learnt and measured: nothing of that is made where no take has an accurate mesh."""
+    return [
+        P.database,
+        *regressor_outputs(),
+        *evaluation_outputs(),
+        P.measures,
+        *([P.ablations] if ablation_tables() else []),
+        P.summary,
+    ]
+
+
 def all_outputs():
     """All that a finished run has."""
     landmark_model = [P.landmark_model] if DETECTOR == "trained" else []
@@ -75,16 +87,12 @@ def all_outputs():
         *clip_outputs(),
         *subject_outputs(),
         *detail_outputs(),
-        P.database,
-        *regressor_outputs(),
-        *evaluation_outputs(),
-        P.measures,
+        *(study_outputs() if database_takes() else []),
         *of_takes(P.apply_overlay, applied_takes()),
         *of_takes(P.corrected, applied_takes()),
+        *of_takes(P.lips_page, applied_takes()),
         *guided_outputs(),
         *of_takes(P.guided_measures, studied_takes()),
         *(of_takes(P.makeup, applied_takes()) if CONFIG.apply.makeup.enabled else []),
-        *([P.ablations] if ablation_tables() else []),
         P.quality,
-        P.summary,
     ]

@@ -24,6 +24,8 @@ def summary(results: Path) -> list[str]:
     ):
         if (results / name).is_file():
             lines.append(f"{what}: {results / name}")
+    for page in sorted(results.glob("apply/*/*/lips.html")):
+        lines.append(f"video beside result: {page}")
     for overlay in sorted(results.glob("apply/*/*/overlay.mp4")):
         lines.append(f"corrected video: {overlay}")
     return lines

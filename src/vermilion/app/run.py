@@ -13,13 +13,17 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from vermilion.app.results import summary
+from vermilion.app.workflow import run_workflow
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take, read_takes
+from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import FAILED_SUFFIX
 
 
@@ -58,8 +62,12 @@ def run_all(
     takes: list[Take],
     options: list[str],
     left_out: dict[str, str],
+    expected_s: Callable[[str], float] | None = None,
 ) -> tuple[int, dict[str, str]]:
     """Run until all but the takes that fail, and those that the configuration leaves out, is made.
+
+    Args:
+        expected_s: rule -> seconds that one of its jobs takes about.
 
     Returns:
         (exit code of the first run, takes that were left out -> why); raises SystemExit where what
@@ -68,7 +76,8 @@ def run_all(
     skipped, first = dict(left_out), 0
     while True:
         clear_failures(results)
-        code = subprocess.run(command(configuration, skipped, options), check=False).returncode
+        words = command(configuration, skipped, options)
+        code = run_workflow(words, results / "logs" / "snakemake.log", expected_s)
         first = first or code
         new = {n: why for n, why in failures(results, takes).items() if n not in skipped}
         if code == 0:
@@ -92,10 +101,8 @@ def write_report(configuration: str, results: Path, skipped: dict[str, str]) -> 
 
 def main(configuration: str, options: list[str]) -> int:
     """Run, write the report, say where to look; 0 where every take was made."""
-    raw = yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {}
-    default = Configuration.model_fields
-    results = Path(raw.get("results", default["results"].default))
-    takes, _ = read_takes(str(raw.get("takes", default["takes"].default)))
+    raw, results = _read(configuration), results_folder(configuration)
+    takes, _ = read_takes(str(raw.get("takes", Configuration.model_fields["takes"].default)))
     code, skipped = 0, dict(raw.get("skip_takes", {}))
     if options != ["--only-report"]:
         code, skipped = run_all(configuration, results, takes, options, skipped)
@@ -104,6 +111,31 @@ def main(configuration: str, options: list[str]) -> int:
     if skipped and code:
         print(_sentence("Left out; all else was made", skipped), file=sys.stderr, flush=True)
     return code
+
+
+def results_folder(configuration: str | Path) -> Path:
+    """The folder of a configuration's results."""
+    named = _read(configuration).get("results", Configuration.model_fields["results"].default)
+    return Path(str(named))
+
+
+def _read(configuration: str | Path) -> dict[str, Any]:
+    """A configuration file as it is, unchecked. Raises InputError where it cannot be read."""
+    try:
+        content = yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {}
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(
+            f"no readable configuration ({error})", "a YAML file", "Correct the path or the file.",
+            path=configuration,
+        ) from error  # fmt: skip
+    if not isinstance(content, dict):
+        raise InputError(
+            f"a {type(content).__name__}",
+            "keys and values",
+            "See config/README.md.",
+            path=configuration,
+        )
+    return content
 
 
 def _sentence(head: str, takes: dict[str, str]) -> str:

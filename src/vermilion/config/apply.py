@@ -9,6 +9,8 @@ from pydantic import Field
 from vermilion.config.base import StageConfig, section
 
 HEX = r"^#[0-9a-fA-F]{6}$"
+#: Value of `regressor` with which contours alone move the lips.
+NO_REGRESSOR = "none"
 
 
 ExportFormat = Literal["usd", "usd_shapes", "gltf", "alembic", "obj", "ply"]
@@ -93,8 +95,20 @@ class ApplyConfig(StageConfig):
         "MS",
         pattern=r"^[A-Za-z0-9_.{}\-]+$",
         description="Regressor to apply: `MS`, `PS-{subject}` or `GR-{subject}`, where `{subject}` "
-        "stands for the take's subject, or the full name of one.",
+        "stands for the take's subject, or the full name of one. `none`: nothing is learnt; the lips "
+        "of the track follow the contours in the image.",
+    )
+    model: str | None = Field(
+        None,
+        min_length=1,
+        description="File of a regressor trained elsewhere (`models/<name>.h5` of another run), used in "
+        "place of `regressor`. The face model must be that of its training.",
     )
     export: ExportConfig = section(ExportConfig, "Files that other programs open.")
     overlay: OverlayConfig = section(OverlayConfig, "The overlay video.")
     makeup: MakeUpConfig = section(MakeUpConfig, "Virtual make-up.")
+
+    @property
+    def trains(self) -> bool:
+        """Whether a regressor of this run's own training is applied."""
+        return self.model is None and self.regressor != NO_REGRESSOR

@@ -13,6 +13,7 @@ from vermilion.correspondence.correspondence import (
     CorrespondenceSettings,
     MarkedMesh,
     find_correspondence,
+    mouth_mask,
 )
 from vermilion.correspondence.landmarks import back_project, inner_features
 from vermilion.faces.model import FaceModel
@@ -148,6 +149,27 @@ def _marked(
         neutral.coarse.vertices_mm[None], neutral.rotation[None], neutral.translation_mm[None]
     )
     return replace(marked[0], mesh=neutral.coarse.with_vertices(head[0])), marked[1]
+
+
+def model_mouth_mask(
+    face: FaceModel, neutral_mm: np.ndarray, settings: CorrespondenceSettings
+) -> np.ndarray:
+    """The mask of a person's mesh where no accurate mesh is known, (M,) int32 triangle ids.
+
+    Args:
+        face: the tracker's model.
+        neutral_mm: (V, 3) of the person, head frame.
+        settings: `mask_radius_mm` and `eye_gap_mm`.
+    """
+    points_mm = neutral_mm[face.landmarks]
+    marked = MarkedMesh(
+        Mesh(np.asarray(neutral_mm, dtype=np.float64), face.triangles),
+        SurfacePoints.at_vertices(face.landmarks, face.triangles),
+        face.regions,
+    )
+    lids_mm = points_mm[np.concatenate([EYE_RIGHT, EYE_LEFT])]
+    every = np.ones(len(face.triangles), dtype=bool)
+    return mouth_mask(marked, points_mm[MOUTH].mean(axis=0), lids_mm, every, settings)
 
 
 def quality_of(found: Correspondence, registered: Mesh, accurate: Mesh, frame: int) -> QualityRow:

@@ -15,6 +15,8 @@ _LINE, _OUTSIDE, _NOT_CORRECTED = "#2a6f97", "#c8553d", "#dddddd"
 def draw_timeline(quality: pd.DataFrame, title: str, out: str | Path) -> None:
     """Novelty with its limit, and the largest correction, over the frames; PNG.
 
+    Without a regressor there is no novelty, and no panel of it.
+
     Args:
         quality: rows of the apply stage's quality tables in order of time: frame, valid, novelty,
             novelty_limit, largest_correction_mm.
@@ -23,23 +25,26 @@ def draw_timeline(quality: pd.DataFrame, title: str, out: str | Path) -> None:
     novelty = quality["novelty"].to_numpy(dtype=float)
     limit = float(quality["novelty_limit"].iloc[0])
     outside = novelty > limit
-    figure = new_figure(8.6, 3.6)
-    above, below = figure.subplots(2, 1, sharex=True)
-    above.plot(*with_gaps(frames, novelty), color=_LINE, lw=1.4)
-    if np.isfinite(limit):
-        above.axhline(limit, color=_OUTSIDE, lw=1.0, ls="--")
-    above.plot(frames[outside], novelty[outside], ".", color=_OUTSIDE, ms=6)
-    above.set_ylabel("novelty")
+    learnt = bool(np.isfinite(novelty).any())
+    figure = new_figure(8.6, 3.6 if learnt else 2.2)
+    axes = np.atleast_1d(figure.subplots(1 + learnt, 1, sharex=True))
+    above, below = axes[0], axes[-1]
+    said = "flagged" if not learnt else "outside the training's span"
+    count = outside.sum() if learnt else (quality["valid"] == 0).sum()
+    if learnt:
+        above.plot(*with_gaps(frames, novelty), color=_LINE, lw=1.4)
+        if np.isfinite(limit):
+            above.axhline(limit, color=_OUTSIDE, lw=1.0, ls="--")
+        above.plot(frames[outside], novelty[outside], ".", color=_OUTSIDE, ms=6)
+        above.set_ylabel("novelty")
     above.set_title(
-        f"{title}: {int(outside.sum())} of {len(frames)} frames outside the training's span",
-        loc="left",
-        fontsize=10,
+        f"{title}: {int(count)} of {len(frames)} frames {said}", loc="left", fontsize=10
     )
     moved = quality["largest_correction_mm"].to_numpy(dtype=float)
     below.plot(*with_gaps(frames, moved), color=_LINE, lw=1.4)
     below.set_ylabel("largest\ncorrection, mm")
     below.set_xlabel("frame")
-    for axis in (above, below):
+    for axis in axes:
         plain(axis)
         axis.set_ylim(bottom=0)
         for frame in frames[quality["valid"].to_numpy() == 0]:

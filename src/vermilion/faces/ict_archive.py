@@ -138,8 +138,16 @@ def _opened(path: Path) -> Iterator[Callable[[str], bytes]]:
 
         yield read_file
         return
+    yield archive_contents(path).__getitem__
+
+
+def archive_contents(path: Path) -> dict[str, bytes]:
+    """Files of `FaceXModel/` in an archive, by name.
+
+    Raises InputError where it cannot be read.
+    """
     try:
-        contents = _zip_contents(path) if zipfile.is_zipfile(path) else _tar_contents(path)
+        return _zip_contents(path) if zipfile.is_zipfile(path) else _tar_contents(path)
     except (OSError, EOFError, tarfile.TarError, zipfile.BadZipFile, lzma.LZMAError) as error:
         raise InputError(
             f"an unreadable archive ({error})",
@@ -147,7 +155,6 @@ def _opened(path: Path) -> Iterator[Callable[[str], bytes]]:
             "Correct `face_model.path`.",
             path=path,
         ) from error
-    yield contents.__getitem__
 
 
 def _tar_contents(path: Path) -> dict[str, bytes]:

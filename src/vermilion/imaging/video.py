@@ -250,10 +250,15 @@ def _list_packets(container: av.container.InputContainer, stream: av.VideoStream
     return VideoIndex(tuple(sorted(stamps)), tuple(sorted(keys)))
 
 
-def write_video(path: str | Path, images: Iterable[np.ndarray], fps: float) -> None:
+def write_video(
+    path: str | Path,
+    images: Iterable[np.ndarray],
+    fps: float,
+    most_kbits: float | None = None,
+) -> None:
     """Write `images` (h, w, 3) uint8 sRGB as H.264 in MP4, tagged as BT.709.
 
-    Odd sizes lose one row or column.
+    Odd sizes lose one row or column. `most_kbits` a second bound the size of the file.
     """
     with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
         # One thread and no macroblock tree, so that the same images give the same bytes: x264's
@@ -261,6 +266,9 @@ def write_video(path: str | Path, images: Iterable[np.ndarray], fps: float) -> N
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": "20", "preset": "veryfast", "threads": "1", "mbtree": "0"}
+        if most_kbits is not None:
+            bound = {"maxrate": f"{most_kbits:.0f}k", "bufsize": f"{2 * most_kbits:.0f}k"}
+            stream.options = {**stream.options, **bound, "crf": "23"}
         context = stream.codec_context
         context.colorspace, context.color_range = _TAG_709, ColorRange.MPEG
         context.color_trc, context.color_primaries = ColorTrc.BT709, ColorPrimaries.BT709

@@ -4,9 +4,12 @@ import numpy as np
 
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
+from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correction.coarse_take import CoarseTake
-from vermilion.correction.correct import CorrectionSettings, correct
+from vermilion.correction.correct import CorrectionSettings, correct, correct_by_image
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
+from vermilion.correspondence.correspondence import CorrespondenceSettings
+from vermilion.correspondence.neutral import model_mouth_mask
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import to_display
@@ -31,19 +34,35 @@ def quality_row(frame, tracked, has_features, figures):
 
 
 def corrected_take(inputs, tracker, fit, cfg, frames, fps):
-    """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor that made them."""
-    settings = CorrectionConfig(
+    """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor, None where there is none."""
+    options = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
-    pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
-    model = with_known_neutrals(load_model(inputs.model), tracker.triangles, *pairs)
     take = CoarseTake.load(
         tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
-        frames, settings.reach_frames(fps),
+        frames, options.reach_frames(fps),
     )  # fmt: skip
-    corrected = correct(model, take, CorrectionSettings.of(settings.at(fps)))
+    settings, model = CorrectionSettings.of(options.at(fps)), None
+    if inputs.model:
+        pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
+        model = with_known_neutrals(load_model(inputs.model), tracker.triangles, *pairs)
+        corrected = correct(model, take, settings)
+    else:
+        region = CorrespondenceConfig(**cfg["correspondence"]).model_dump(exclude={"landmarks"})
+        mask = model_mouth_mask(tracker, take.neutral_mm, CorrespondenceSettings(**region))
+        corrected = correct_by_image(mask, take, settings)
     asked = np.searchsorted(take.frames, frames)
     return take[asked], corrected[asked], model
+
+
+def novelty_of(model, take):
+    """Novelty (F,) of each frame and its limit; NaN without a regressor or without features."""
+    novelty = np.full(len(take), np.nan)
+    if model is None:
+        return novelty, np.nan
+    known = np.isfinite(take.features).all(axis=1)
+    novelty[known] = model.novelty(take.features[known], take.neutral_mm)
+    return novelty, model.novelty_limit
 
 
 def main(snakemake):
@@ -57,15 +76,14 @@ def main(snakemake):
     write_sequence(out.corrected, corrected)
 
     has_features = np.isfinite(take.features).all(axis=1)
-    novelty = np.full(len(frames), np.nan)
-    novelty[has_features] = model.novelty(take.features[has_features], take.neutral_mm)
+    novelty, novelty_limit = novelty_of(model, take)
     moved = np.linalg.norm(corrected - take.coarse_mm, axis=2).max(axis=1)
     rows_of_quality = [
         quality_row(
             int(frame), bool(take.valid[i]), bool(has_features[i]),
             {
                 "novelty": novelty[i],
-                "novelty_limit": model.novelty_limit,
+                "novelty_limit": novelty_limit,
                 "largest_correction_mm": moved[i],
             },
         )
@@ -75,10 +93,11 @@ def main(snakemake):
 
     source, camera = open_frames(params.source, *place), fit.camera
     view = framing(tracker, take.neutral_mm, fit, overlay.margin, overlay.panel_height_px)
+    after = f"corrected, {model.name}" if model else "with contours"
     images = overlay_frames(
         view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames,
         fit.index_of(frames), take.valid,
-        [("base track", take.coarse_mm), (f"corrected, {model.name}", corrected)],
+        [("base track", take.coarse_mm), (after, corrected)],
         overlay.opacity, "/".join(place),
     )  # fmt: skip
     write_video(out.overlay, progress(images, "overlay", len(frames)), params.fps)

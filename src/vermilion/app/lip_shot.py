@@ -1,0 +1,176 @@
+"""The configuration and the take sheet of one video, written so that one can go on with the full tool."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+
+import yaml
+
+from vermilion.config.frame_range import frame_range
+from vermilion.imaging.source import is_video
+from vermilion.imaging.video import VideoReader
+from vermilion.storage.errors import InputError
+from vermilion.storage.files import write_text
+
+SUBJECT = "face"
+#: Frames of a job: fewer keep all cores busy, but a job needs about two seconds to start.
+LEAST_CHUNK, MOST_CHUNK = 50, 300
+#: Rate of a folder of images, which does not tell one.
+FOLDER_FPS = 25.0
+_LETTERS = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "ø": "oe", "å": "a"}
+)
+
+
+@dataclass(frozen=True)
+class LipShot:
+    """What a user asks for.
+
+    Attributes:
+        video: a video file, or a folder of numbered images.
+        results: folder of all results.
+        face_model: lines of the section `face_model`, as a mapping.
+        model: file of a trained regressor; None: contours alone.
+        scan: a scan of the person; None where there is none.
+        first, last: frames; None: from the first, to the last one.
+    """
+
+    video: Path
+    results: str
+    face_model: dict[str, str]
+    model: Path | None = None
+    scan: Path | None = None
+    first: int | None = None
+    last: int | None = None
+
+    @property
+    def take(self) -> str:
+        """Name of the take: the file's, in the letters that a take may have."""
+        return take_name(self.video.stem if self.video.is_file() else self.video.name)
+
+    def into(self, results: str) -> LipShot:
+        """The same with another folder of results."""
+        return replace(self, results=results)
+
+    @property
+    def configuration(self) -> Path:
+        """The file that is written: `config.yaml` in the results."""
+        return Path(self.results) / "config.yaml"
+
+
+def take_name(text: str) -> str:
+    """A name in letters, digits, `_` and `.`: umlauts are spelt out, accents go, the rest is `_`.
+
+    A name of other alphabets alone becomes `clip`.
+    """
+    plain = unicodedata.normalize("NFC", text).lower().translate(_LETTERS)
+    plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+    plain = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
+    return plain or "clip"
+
+
+def write_shot(shot: LipShot, cores: int = 1) -> tuple[int, int]:
+    """Write `config.yaml` and `takes.tsv`; files that are the same already stay as they are.
+
+    A `config.yaml` that somebody changed is kept beside, as `config.yaml.before`.
+
+    Args:
+        cores: jobs that run side by side.
+
+    Returns:
+        (number of frames, frames of a job).
+
+    Raises:
+        InputError: the source is no video and no folder of images, or has no frames.
+    """
+    first, last = _range(shot)
+    fps = VideoReader(shot.video).fps if is_video(shot.video) else FOLDER_FPS
+    if "\t" in str(shot.video) or "\n" in str(shot.video):
+        raise InputError("a tab in the path", "a path without tabs", "Rename it.", path=shot.video)
+    sheet = Path(shot.results) / "takes.tsv"
+    columns = ["subject", "take", "role", "source", "first", "last", "fps", "split"]
+    row = [
+        SUBJECT,
+        shot.take,
+        "video",
+        str(shot.video),
+        str(first),
+        str(last),
+        f"{fps:.6g}",
+        "none",
+    ]
+    _write_changed(sheet, "\t".join(columns) + "\n" + "\t".join(row) + "\n")
+    n_frames = last - first + 1
+    chunk = min(max(ceil(n_frames / cores), LEAST_CHUNK), MOST_CHUNK)
+    _write_changed(shot.configuration, _configuration(shot, sheet, chunk))
+    return n_frames, chunk
+
+
+def _range(shot: LipShot) -> tuple[int, int]:
+    first, last = frame_range(shot.video, "video")
+    asked_first = first if shot.first is None else shot.first
+    asked_last = last if shot.last is None else shot.last
+    if not first <= asked_first <= asked_last <= last:
+        raise InputError(
+            f"frames {first} to {last}",
+            f"frames {asked_first} to {asked_last}",
+            "Correct FIRST and LAST.",
+            path=shot.video,
+        )
+    return asked_first, asked_last
+
+
+def _write_changed(path: Path, text: str) -> None:
+    if path.is_file():
+        before = path.read_text(encoding="utf-8")
+        if before == text:
+            return
+        if path.suffix == ".yaml":
+            write_text(Path(f"{path}.before"), before)
+    write_text(path, text)
+
+
+def _configuration(shot: LipShot, sheet: Path, chunk: int) -> str:
+    """The text of the configuration, with a comment at each key."""
+    apply = "regressor: none"
+    if shot.model is not None:
+        apply = f"model: {_scalar(shot.model)}"
+    scans = ""
+    if shot.scan is not None:
+        scans = f"""
+tracking:
+  # The person's scan, from which their face model is made (docs/scan.md).
+  scans:
+    {SUBJECT}: {{path: {_scalar(shot.scan)}}}
+"""
+    face = "\n".join(f"  {key}: {_scalar(value)}" for key, value in shot.face_model.items())
+    return f"""\
+# Written by `vermilion lips`. Change what you like (docs/configuration.md has all keys), then go on with
+#     make run CONFIG={shot.configuration}
+# Only what depends on the change runs again.
+results: {_scalar(shot.results)}
+takes: {_scalar(sheet)}
+# Frames of a job; it changes no result.
+chunk_frames: {chunk}
+
+face_model:
+{face}
+
+landmarks:
+  # 478 landmarks of a network that is trained on real faces.
+  detector: mediapipe
+{scans}
+apply:
+  # `regressor: none` lets the lips follow the contours in the image; `model: FILE.h5` names a trained
+  # regressor, which corrects them before.
+  {apply}
+"""
+
+
+def _scalar(value: object) -> str:
+    """A value as YAML writes it on one line."""
+    return yaml.safe_dump(str(value), allow_unicode=True, width=10_000).partition("\n")[0]

@@ -1,0 +1,99 @@
+"""One video, one command: write its configuration, run it, name the page."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from os import cpu_count
+from pathlib import Path
+
+from vermilion.app import place
+from vermilion.app.face_files import face_model
+from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.app.run import run_all
+from vermilion.config.takes import read_takes
+from vermilion.storage.errors import InputError
+
+#: Rule -> seconds of a job: to start, and of each frame. For the time left alone.
+SECONDS = {
+    "face_model": (14.0, 0.0),
+    "image_identity": (14.0, 0.0),
+    "cameras": (2.0, 0.0),
+    "capture": (2.0, 0.02),
+    "landmarks": (3.0, 0.07),
+    "contour_detector": (6.0, 0.0),
+    "contours": (3.0, 0.1),
+    "appearance": (25.0, 0.0),
+    "image_fit": (3.0, 0.3),
+    "features": (3.0, 0.04),
+    "apply": (4.0, 0.25),
+}
+
+
+def correct_lips(
+    video: str,
+    *,
+    model: str | None,
+    scan: str | None,
+    out: str | None,
+    span: tuple[int | None, int | None],
+    options: Sequence[str],
+) -> int:
+    """Run the workflow for one video.
+
+    Args:
+        video, model, scan: files of the user, from the folder that they are in.
+        out: folder of the results; None: results/lips/<clip> of the project.
+        span: first and last frame; None where the file's counts.
+        options: of Snakemake.
+
+    Returns:
+        exit status: 0 where the page was made.
+
+    Raises:
+        InputError: a file is not there, or the video cannot be read.
+    """
+    given = {name: _file(name, path) for name, path in (("model", model), ("scan", scan)) if path}
+    source = _file("video", video)
+    folder = None if out is None else Path(out).expanduser().absolute()
+    project = place.enter_project()
+    section, sentences = face_model()
+    shot = LipShot(source, "", section, given.get("model"), given.get("scan"), *span)
+    results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
+    n_frames, chunk = write_shot(shot.into(results), cpu_count() or 1)
+    for sentence in sentences:
+        print(sentence, file=sys.stderr)
+    print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
+    takes, problems = read_takes(str(Path(results) / "takes.tsv"))
+    if problems:
+        raise InputError("; ".join(problems), "a take sheet", "Report this.")
+    configuration = str(Path(results) / "config.yaml")
+    code, skipped = run_all(
+        configuration, Path(results), takes, list(options), {}, expected(n_frames, chunk)
+    )
+    if skipped:
+        return code or 1
+    pages = sorted(Path(results).glob("apply/*/*/lips.html"))
+    for page in pages if code == 0 else []:
+        print(f"Look at: {page}")
+    return code
+
+
+def expected(n_frames: int, chunk: int) -> Callable[[str], float]:
+    """Rule -> seconds that one of its jobs takes about, in chunks of so many frames."""
+    frames = min(n_frames, chunk)
+
+    def seconds(rule: str) -> float:
+        start, each = SECONDS.get(rule, (2.0, 0.0))
+        return start + each * frames
+
+    return seconds
+
+
+def _file(what: str, path: str) -> Path:
+    whole = Path(path).expanduser().absolute()
+    if not whole.exists():
+        raise InputError(
+            f"no file or folder {path}", f"a {what}", f"Correct the path of the {what}.", path=whole
+        )
+    return whole

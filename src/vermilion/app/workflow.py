@@ -1,0 +1,147 @@
+"""Run Snakemake as a process beside, with one line of progress on the terminal."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO
+
+from vermilion.app.run_progress import RunProgress
+from vermilion.storage.logfile import FAILED_SUFFIX
+
+#: Options with which Snakemake tells something instead of running jobs.
+TELLING = ("-n", "--dry-run", "--dryrun", "--unlock", "--lint", "--list", "--summary", "--dag")
+_EVERY_S = 1.0
+#: Without a terminal, a line is printed where the stage changes, and this often.
+_PLAIN_EVERY_S = 20.0
+
+
+class ProgressLine:
+    """The one line: overwritten on a terminal, printed now and then elsewhere."""
+
+    def __init__(self, stream: IO[str]):
+        self._stream, self._last, self._printed_s = stream, "", float("-inf")
+        self._overwrites = stream.isatty()
+
+    def show(self, text: str, now_s: float) -> None:
+        """Show a new state of the line."""
+        if self._overwrites:
+            width = shutil.get_terminal_size().columns - 1
+            self._stream.write(f"\r\033[K{text[:width]}")
+        else:
+            stage = text.partition(":")[0].partition(";")[0].partition("] ")[2]
+            if stage == self._last and now_s - self._printed_s < _PLAIN_EVERY_S:
+                return
+            self._last, self._printed_s = stage, now_s
+            self._stream.write(f"{text}\n")
+        self._stream.flush()
+
+    def clear(self) -> None:
+        """Leave the terminal as if the line had never been there."""
+        if self._overwrites:
+            self._stream.write("\r\033[K")
+            self._stream.flush()
+
+
+def run_workflow(
+    words: Sequence[str],
+    log: Path,
+    expected_s: Callable[[str], float] | None = None,
+    stream: IO[str] | None = None,
+) -> int:
+    """Run a command of Snakemake; what it prints goes to `log`, the line of progress to the terminal.
+
+    A job that fails is named with its reason and its log file. Where Snakemake fails before any job,
+    its own message is printed.
+
+    Args:
+        words: the command.
+        log: file for all that Snakemake prints.
+        expected_s: see `RunProgress`.
+        stream: the terminal; standard error where left out.
+
+    Returns:
+        exit code of Snakemake.
+    """
+    if any(word in TELLING for word in words):
+        return subprocess.run(words, check=False).returncode
+    stream = sys.stderr if stream is None else stream
+    state, started = RunProgress(cores=_cores(words)), time.monotonic()
+    if expected_s is not None:
+        state.expected_s = expected_s
+    log.parent.mkdir(parents=True, exist_ok=True)
+    code = _follow(words, log, state, ProgressLine(stream))
+    if code == 0 and state.total:
+        print(f"{state.total} steps in {(time.monotonic() - started) / 60:.1f} min", file=stream)
+    elif code:
+        print(_failure(state, log), file=stream)
+    stream.flush()
+    return code
+
+
+def _follow(words: Sequence[str], log: Path, state: RunProgress, shown: ProgressLine) -> int:
+    """Run the command, keep what it prints, show the line meanwhile; returns its exit code."""
+    process = subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+    )
+    ended, lock = threading.Event(), threading.Lock()
+
+    def refresh() -> None:
+        while not ended.wait(_EVERY_S):
+            now = time.monotonic()
+            with lock:
+                line = state.line(now)
+            shown.show(line, now)
+
+    ticker = threading.Thread(target=refresh, daemon=True)
+    ticker.start()
+    try:
+        with open(log, "w", encoding="utf-8") as kept:
+            assert process.stdout is not None  # a pipe
+            for line in process.stdout:
+                kept.write(line)
+                kept.flush()
+                with lock:
+                    state.feed(line, time.monotonic())
+        return process.wait()
+    except KeyboardInterrupt:
+        process.wait()  # the terminal has told Snakemake as well
+        raise
+    finally:
+        ended.set()
+        ticker.join()
+        shown.clear()
+
+
+def _failure(state: RunProgress, log: Path) -> str:
+    """What failed and why, with the log of each job; else the end of what Snakemake said."""
+    seen, parts = set(), []
+    for job in state.failed:
+        if job.log is None or job.log in seen:
+            continue
+        seen.add(job.log)
+        reason = Path(f"{job.log}{FAILED_SUFFIX}")
+        why = reason.read_text(encoding="utf-8").strip() if reason.is_file() else "see its log"
+        parts.append(f"{job.rule} failed: {why}\nLog: {job.log}")
+    if parts:
+        return "\n".join(["", *parts, ""])
+    text = log.read_text(encoding="utf-8", errors="replace")
+    lines = text.strip().splitlines()
+    starts = [n for n, line in enumerate(lines) if "Error" in line or "Exception" in line]
+    return "\n".join(["", *lines[starts[0] if starts else -12 :][:60], f"Log: {log}", ""])
+
+
+def _cores(words: Sequence[str]) -> int:
+    """Jobs side by side: what `--cores` says, else all cores of this machine."""
+    for option in ("--cores", "-c"):
+        if option in words:
+            value = words[words.index(option) + 1] if words.index(option) + 1 < len(words) else ""
+            if value.isdigit():
+                return int(value)
+    return os.cpu_count() or 1

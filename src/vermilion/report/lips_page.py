@@ -1,0 +1,218 @@
+"""The page of one corrected take: the video beside its result, the time line of warnings, the files."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vermilion.report import page
+
+#: Stages in the order in which they run.
+_STAGES = ("run", "capture", "landmarks", "tracking", "contours", "features", "apply")
+_WHAT = {
+    "run": "left out", "capture": "image", "landmarks": "landmarks", "tracking": "track",
+    "contours": "lip contours", "features": "contour search", "apply": "correction",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TakeFile:
+    """A file to take away: its link from the page, its size, what it is and what opens it."""
+
+    link: str
+    size_bytes: int
+    what: str
+
+
+@dataclass(frozen=True)
+class TakePage:
+    """What the page shows.
+
+    Attributes:
+        title: name of the take.
+        frames: (F,) frame numbers.
+        fps: frames a second.
+        how: what moved the lips, as a sentence.
+        video: an MP4 that browsers play, one image a frame.
+        opening_mm: (F,) distance of the lips at their middle; NaN where not tracked.
+        flagged: rows of the take in quality.tsv: stage, frame, valid, reason.
+        files: to take away.
+        configuration: file with which one goes on.
+    """
+
+    title: str
+    frames: np.ndarray
+    fps: float
+    how: str
+    video: bytes
+    opening_mm: np.ndarray
+    flagged: pd.DataFrame
+    files: Sequence[TakeFile]
+    configuration: str
+
+
+def take_page(found: TakePage) -> str:
+    """The page as one string of HTML with everything embedded."""
+    count, seconds = len(found.frames), len(found.frames) / found.fps
+    lead = f"{count} frames, {seconds:.1f} s at {found.fps:.4g} frames a second. {found.how}"
+    return page.page(
+        found.title,
+        lead,
+        [
+            ("Video beside result", _player(found) + _timeline(found)),
+            ("Warnings", _warnings(found)),
+            ("Files to take away", _files(found.files)),
+            ("Going on", _going_on(found)),
+        ],
+    )
+
+
+def _player(found: TakePage) -> str:
+    encoded = base64.b64encode(found.video).decode("ascii")
+    return (
+        f"{_STYLE}<figure class=shot><video id=shot controls loop muted playsinline "
+        f'src="data:video/mp4;base64,{encoded}"></video>'
+        "<figcaption>Left the video, right the result; below, the mouth from near. Space plays and "
+        "stops, the arrow keys go frame by frame.</figcaption></figure>"
+    )
+
+
+def _timeline(found: TakePage) -> str:
+    """Marks of each stage over the frames, and the opening of the lips, drawn by the script."""
+    position = {int(frame): index for index, frame in enumerate(found.frames)}
+    rows = []
+    for stage in _stages_of(found.flagged):
+        of_stage = found.flagged[found.flagged["stage"] == stage]
+        marks = [
+            [position[int(frame)], int(valid), "" if pd.isna(reason) else str(reason)]
+            for frame, valid, reason in of_stage[["frame", "valid", "reason"]].itertuples(
+                index=False
+            )
+            if int(frame) in position
+        ]
+        rows.append({"name": _WHAT.get(stage, stage), "marks": marks})
+    opening = [None if not np.isfinite(v) else round(float(v), 2) for v in found.opening_mm]
+    data = {
+        "first": int(found.frames[0]), "count": len(found.frames), "fps": found.fps,
+        "rows": rows, "opening": opening,
+    }  # fmt: skip
+    text = json.dumps(data).replace("<", "\\u003c")
+    return (
+        '<div class=timeline><canvas id=line aria-label="time line of warnings"></canvas>'
+        "<p id=said class=none></p></div><p class=legend><i class=bad></i>not usable "
+        "<i class=warn></i>warning <i class=curve></i>opening of the lips, mm. A click goes to the "
+        f"frame.</p><script>const take = {text};\n{_SCRIPT}</script>"
+    )
+
+
+def _stages_of(flagged: pd.DataFrame) -> list[str]:
+    """Stages with a flagged frame, in the order in which they run."""
+    named = list(dict.fromkeys(flagged["stage"]))
+    return sorted(named, key=lambda s: _STAGES.index(s) if s in _STAGES else len(_STAGES))
+
+
+def _warnings(found: TakePage) -> str:
+    if found.flagged.empty:
+        return '<p class="none">None: every stage could use every frame.</p>'
+    rows = found.flagged.assign(
+        stage=found.flagged["stage"].map(lambda s: _WHAT.get(s, s)),
+        state=np.where(found.flagged["valid"] == 0, "not usable", "warning"),
+    )
+    counts = page.frames_of_each(rows, ["stage", "state", "reason"])
+    headings = {
+        "stage": "stage", "state": "", "count": "frames", "which": "which", "reason": "reason"
+    }  # fmt: skip
+    return page.table(counts, headings, "stage")
+
+
+def _files(files: Sequence[TakeFile]) -> str:
+    lines = "".join(
+        f'<tr><td><a href="{page.text(f.link)}">{page.text(f.link.rpartition("/")[2])}</a></td>'
+        f"<td>{page.text(f.what)}</td><td class=n>{_size(f.size_bytes)}</td></tr>"
+        for f in files
+    )
+    return f'<div class="scroll"><table><tbody>{lines}</tbody></table></div>'
+
+
+def _size(size_bytes: int) -> str:
+    return f"{size_bytes / 1e6:.1f} MB" if size_bytes >= 1e5 else f"{size_bytes / 1e3:.1f} kB"
+
+
+def _going_on(found: TakePage) -> str:
+    return (
+        "<p>The configuration of this run is <code>"
+        f"{page.text(found.configuration)}</code>. Change a key in it and run "
+        f"<code>make run CONFIG={page.text(found.configuration)}</code>: only what depends on the change "
+        "runs again. All keys are in docs/configuration.md.</p>"
+    )
+
+
+_STYLE = """<style>
+figure.shot { margin: 12px 0; } figure.shot video { width: 100%; max-height: 78vh; background: #161412;
+  border-radius: 6px; display: block; }
+.timeline { position: relative; } #line { width: 100%; display: block; cursor: crosshair;
+  touch-action: pan-y; } #said { min-height: 1.5em; margin: 4px 0; font-size: 14px; }
+.legend { font-size: 13px; color: var(--soft); } .legend i { display: inline-block; width: 10px;
+  height: 10px; margin: 0 5px 0 12px; border-radius: 2px; } .legend i:first-child { margin-left: 0; }
+.bad { background: #b3362a; } .warn { background: #e0a63a; } .curve { background: #2a6f97; }
+@media (max-width: 500px) { main { padding: 20px 14px 60px; } h1 { font-size: 24px; overflow-wrap: anywhere; } }
+</style>"""
+
+_SCRIPT = """
+const video = document.getElementById('shot'), canvas = document.getElementById('line');
+const said = document.getElementById('said'), left = 96, row = 20, curve = 56;
+const at = () => Math.min(take.count - 1, Math.max(0, Math.floor(video.currentTime * take.fps + 0.01)));
+function draw() {
+  const wide = canvas.clientWidth, high = take.rows.length * row + curve + 22, ratio = devicePixelRatio || 1;
+  canvas.width = wide * ratio; canvas.height = high * ratio; canvas.style.height = high + 'px';
+  const pen = canvas.getContext('2d'); pen.scale(ratio, ratio); pen.font = '12px system-ui, sans-serif';
+  const span = wide - left - 8, x = n => left + span * n / take.count, each = Math.max(span / take.count, 1.5);
+  take.rows.forEach((stage, index) => {
+    const y = index * row;
+    pen.fillStyle = '#6d6761'; pen.fillText(stage.name, 0, y + 14);
+    pen.fillStyle = '#f1ece6'; pen.fillRect(left, y + 4, span, row - 8);
+    for (const [n, valid] of stage.marks) {
+      pen.fillStyle = valid ? '#e0a63a' : '#b3362a'; pen.fillRect(x(n), y + 3, each, row - 6);
+    }
+  });
+  const top = take.rows.length * row + 6, most = Math.max(4, ...take.opening.filter(v => v !== null));
+  pen.fillStyle = '#6d6761'; pen.fillText('opening, mm', 0, top + 12);
+  pen.fillText(most.toFixed(0), left - 22, top + 10); pen.fillText('0', left - 14, top + curve);
+  pen.strokeStyle = '#2a6f97'; pen.lineWidth = 1.4; pen.beginPath();
+  let pause = true;
+  take.opening.forEach((value, n) => {
+    if (value === null) { pause = true; return; }
+    const y = top + curve - 2 - (curve - 8) * value / most;
+    pause ? pen.moveTo(x(n + 0.5), y) : pen.lineTo(x(n + 0.5), y); pause = false;
+  });
+  pen.stroke();
+  const now = at(), reasons = [];
+  pen.strokeStyle = '#23211f'; pen.lineWidth = 1; pen.beginPath();
+  pen.moveTo(x(now + 0.5), 0); pen.lineTo(x(now + 0.5), high - 14); pen.stroke();
+  for (const stage of take.rows) for (const [n, , why] of stage.marks) {
+    if (n === now) reasons.push(stage.name + ': ' + why);
+  }
+  said.textContent = 'frame ' + (take.first + now) + (reasons.length ? ': ' + reasons.join('; ') : '');
+}
+function go(n) { video.currentTime = (Math.min(take.count - 1, Math.max(0, n)) + 0.5) / take.fps; }
+canvas.addEventListener('pointerdown', event => {
+  const span = canvas.clientWidth - left - 8;
+  if (event.offsetX >= left) go(Math.floor((event.offsetX - left) / span * take.count));
+});
+document.addEventListener('keydown', event => {
+  if (event.target.matches('input, textarea, select')) return;
+  if (event.key === 'ArrowRight' || event.key === 'ArrowLeft') {
+    video.pause(); go(at() + (event.key === 'ArrowRight' ? 1 : -1)); event.preventDefault();
+  } else if (event.key === ' ' && event.target !== video) {
+    video.paused ? video.play() : video.pause(); event.preventDefault();
+  }
+});
+function follow() { draw(); if (!video.paused) requestAnimationFrame(follow); }
+for (const name of ['play', 'seeked', 'loadeddata', 'pause']) video.addEventListener(name, follow);
+addEventListener('resize', draw); draw();
+"""

@@ -1,0 +1,78 @@
+"""`vermilion lips`: the configuration that it writes is one that the workflow takes."""
+
+import numpy as np
+import pytest
+import yaml
+
+from vermilion.app.lip_shot import LipShot, take_name, write_shot
+from vermilion.app.lips import expected
+from vermilion.config.load import load_configuration
+from vermilion.imaging.video import write_video
+from vermilion.storage.errors import InputError
+
+
+@pytest.fixture
+def clip(tmp_path):
+    """A portrait clip of 30 frames at 29.97 a second, with a space and umlauts in its path."""
+    path = tmp_path / "Über uns" / "Größe 1 (final).mp4"
+    path.parent.mkdir()
+    grey = np.full((96, 54, 3), 90, np.uint8)
+    write_video(path, [grey] * 30, 30000 / 1001)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("Größe 1 (final)", "groesse_1_final"),
+        ("IMG_0001", "img_0001"),
+        ("été", "ete"),
+        ("映像", "clip"),
+    ],
+)
+def test_a_take_is_named_after_its_file(text, name):
+    assert take_name(text) == name
+
+
+def test_the_workflow_takes_what_is_written(clip, tmp_path):
+    scan, model = tmp_path / "a b.obj", tmp_path / "MS: 1.h5"
+    scan.write_text("")
+    results = str(tmp_path / "out put")
+    shot = LipShot(clip, results, {"name": "procedural"}, model, scan)
+    assert write_shot(shot, cores=2) == (30, 50)
+    raw = yaml.safe_load(shot.configuration.read_text(encoding="utf-8"))
+    configuration, takes = load_configuration(raw, "config.yaml")
+    assert configuration.results == results and configuration.apply.model == str(model)
+    assert configuration.tracking.scans["face"].path == str(scan)
+    (take,) = takes
+    assert take.source == str(clip) and (take.first, take.last) == (0, 29)
+    assert take.fps == pytest.approx(29.97, abs=0.01)
+
+
+def test_without_a_model_nothing_is_learnt(clip, tmp_path):
+    shot = LipShot(clip, str(tmp_path / "out"), {"name": "procedural"}, last=9)
+    assert write_shot(shot) == (10, 50)
+    raw = yaml.safe_load(shot.configuration.read_text(encoding="utf-8"))
+    configuration, _ = load_configuration(raw, "config.yaml")
+    assert not configuration.apply.trains and configuration.apply.model is None
+
+
+def test_a_configuration_that_somebody_changed_is_kept_beside(clip, tmp_path):
+    shot = LipShot(clip, str(tmp_path / "out"), {"name": "procedural"})
+    write_shot(shot)
+    written = shot.configuration.stat().st_mtime_ns
+    write_shot(shot)
+    assert shot.configuration.stat().st_mtime_ns == written  # the same: nothing runs again
+    shot.configuration.write_text("changed: 1\n")
+    write_shot(shot)
+    assert shot.configuration.with_name("config.yaml.before").read_text() == "changed: 1\n"
+
+
+def test_frames_that_the_clip_does_not_have_are_refused(clip, tmp_path):
+    with pytest.raises(InputError, match="frames 0 to 29"):
+        write_shot(LipShot(clip, str(tmp_path), {"name": "procedural"}, last=30))
+
+
+def test_a_longer_clip_is_expected_to_take_longer():
+    assert expected(300, 300)("apply") > 2 * expected(50, 300)("apply")
+    assert expected(3000, 300)("apply") == expected(300, 300)("apply")  # of one job

@@ -1,0 +1,90 @@
+"""The line of progress: stage, frames, frames a second, time left, and what failed."""
+
+import io
+import sys
+
+from vermilion.app.run_progress import RunProgress
+from vermilion.app.workflow import ProgressLine, run_workflow
+from vermilion.storage.logfile import FAILED_SUFFIX
+
+START = """Job stats:
+job            count
+-----------  -------
+landmarks          2
+image_fit          2
+all                1
+total              5
+
+"""
+
+
+def started(rule, jobid, log):
+    return f"[now]\nrule {rule}:\n    input: a, b\n    log: {log}\n    jobid: {jobid}\n\n"
+
+
+def fed(state, text, now_s):
+    for line in text.splitlines(keepends=True):
+        state.feed(line, now_s)
+    return state
+
+
+def test_the_line_names_stage_frames_rate_and_time_left(tmp_path):
+    log = tmp_path / "landmarks.log"
+    log.write_text(
+        "landmarks: 10 of 100, 20.00 a second, 4 s left\nlandmarks: 40 of 100, 20.00 a second, 3 s left\n"
+    )
+    state = fed(
+        RunProgress(expected_s=lambda rule: 10.0), START + started("landmarks", 3, log), 0.0
+    )
+    # 3 s of this job, one more of landmarks, two of image_fit, `all`: 10 s each.
+    assert state.left_s(2.0) == 43.0
+    assert state.line(2.0) == "[0/5] landmarks: 40 of 100 frames, 20 a second; about 45 s left"
+
+
+def test_jobs_that_ended_correct_what_was_expected():
+    state = fed(
+        RunProgress(expected_s=lambda rule: 10.0), START + started("landmarks", 3, "none.log"), 0.0
+    )
+    fed(state, "Finished jobid: 3 (Rule: landmarks)\n1 of 5 steps (20%) done\n", 20.0)
+    # The second of landmarks as the first, the rest at the pace that was seen: twice as long.
+    assert state.left_s(20.0) == 20.0 + 2 * 20.0 + 20.0
+    assert not state.running and state.line(20.0).startswith("[1/5]")
+
+
+def test_two_cores_halve_the_time_left():
+    one, two = (fed(RunProgress(expected_s=lambda rule: 8.0, cores=c), START, 0.0) for c in (1, 2))
+    assert one.left_s(0.0) == 2 * two.left_s(0.0) == 40.0
+
+
+def test_a_failed_job_is_named_with_its_reason_and_its_log(tmp_path):
+    log = tmp_path / "x-1.log"
+    (tmp_path / f"x-1.log{FAILED_SUFFIX}").write_text("frame 7: no face")
+    said = START + started("landmarks", 3, log) + (
+        f"Error in rule landmarks:\n    message: None\n    jobid: 3\n    log: {log} (check log file(s) for error details)\n"
+    )  # fmt: skip
+    words = [sys.executable, "-c", f"print({said!r}); raise SystemExit(1)"]
+    terminal = io.StringIO()
+    assert run_workflow(words, tmp_path / "logs/snakemake.log", stream=terminal) == 1
+    assert "landmarks failed: frame 7: no face" in terminal.getvalue()
+    assert f"Log: {log}" in terminal.getvalue()
+    assert "Job stats:" in (tmp_path / "logs/snakemake.log").read_text()
+
+
+def test_what_fails_before_any_job_is_said(tmp_path):
+    words = [sys.executable, "-c", "print('WorkflowError: 2 problem(s)'); raise SystemExit(1)"]
+    terminal = io.StringIO()
+    run_workflow(words, tmp_path / "s.log", stream=terminal)
+    assert "2 problem(s)" in terminal.getvalue()
+
+
+def test_without_a_terminal_a_line_a_stage():
+    out = io.StringIO()
+    line = ProgressLine(out)
+    for now_s, text in (
+        (0, "[1/9] a: 1 of 2"),
+        (1, "[1/9] a: 2 of 2"),
+        (2, "[2/9] b"),
+        (40, "[2/9] b"),
+    ):
+        line.show(text, now_s)
+    assert out.getvalue().splitlines() == ["[1/9] a: 1 of 2", "[2/9] b", "[2/9] b"]
