@@ -6,14 +6,16 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
-RESULTS = $$($(BIN)/python -c 'import sys, yaml; print(yaml.safe_load(open(sys.argv[1])).get("results", "results/demo"))' $(CONFIG))
+VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo run sketch report verify test test-quick lint format docs reference clean
+.PHONY: help setup demo lips run sketch doctor report verify test test-quick lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
+	@echo "make lips        better lips for VIDEO=clip.mp4 (MODEL=, SCAN=, OUT=): files and a page"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
+	@echo "make doctor      say what is missing, and what to do about it"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
@@ -32,20 +34,27 @@ $(LANDMARKS): requirements.mediapipe.lock tools/setup_landmarks.sh | $(READY)
 	tools/setup_landmarks.sh $(VENV)-mediapipe $(PYTHON)
 	@touch $@
 
-demo: CONFIG = config/config.yaml
-demo: run
+demo: setup
+	@$(VERMILION) demo
+
+lips: setup
+	@$(VERMILION) lips "$(VIDEO)" $(if $(MODEL),--model "$(MODEL)") $(if $(SCAN),--scan "$(SCAN)") \
+	    $(if $(OUT),--out "$(OUT)") $(if $(FIRST),--first $(FIRST)) $(if $(LAST),--last $(LAST))
 
 run: setup
-	@$(BIN)/python -m vermilion.app.run $(CONFIG) --quiet rules reason host
+	@$(VERMILION) run "$(CONFIG)"
+
+doctor: $(READY)
+	@$(VERMILION) doctor
 
 sketch: $(READY)
-	@$(BIN)/python -m vermilion.app.sketch "$(CONFIG)" "$(TAKE)"
+	@$(VERMILION) sketch "$(CONFIG)" "$(TAKE)"
 
 report: $(READY)
-	@$(BIN)/python -m vermilion.app.run $(CONFIG) --only-report
+	@$(VERMILION) report "$(CONFIG)"
 
 verify: $(READY)
-	@$(BIN)/python -m vermilion.provenance.checksums "$(RESULTS)"
+	@$(VERMILION) verify "$(CONFIG)"
 
 test: test-quick
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m slow

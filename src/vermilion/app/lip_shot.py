@@ -21,9 +21,8 @@ SUBJECT = "face"
 LEAST_CHUNK, MOST_CHUNK = 50, 300
 #: Rate of a folder of images, which does not tell one.
 FOLDER_FPS = 25.0
-_LETTERS = str.maketrans(
-    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "ø": "oe", "å": "a"}
-)
+#: Two dots over a letter, as a character of its own.
+_DIAERESIS = "\u0308"
 
 
 @dataclass(frozen=True)
@@ -67,8 +66,8 @@ def take_name(text: str) -> str:
 
     A name of other alphabets alone becomes `clip`.
     """
-    plain = unicodedata.normalize("NFC", text).lower().translate(_LETTERS)
-    plain = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+    plain = unicodedata.normalize("NFKD", text.casefold()).replace(_DIAERESIS, "e")
+    plain = plain.encode("ascii", "ignore").decode()
     plain = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
     return plain or "clip"
 
