@@ -61,6 +61,12 @@ def exports_to(folder, overlay, timeline, category):
     return outputs
 
 
+def exported_files(folder):
+    """Format -> its file, of those that the configuration asks for and that are one file."""
+    asked = {name: EXPORTED[name] for name in CONFIG.apply.export.formats}
+    return {name: folder + path for name, path in asked.items() if "." in path}
+
+
 def exports_need(wildcards):
     """What the exported files need beyond the corrected chunks (use with `unpack`)."""
     needed = {"identity": P.identity.format(subject=wildcards.subject)}
@@ -163,7 +169,7 @@ def how_applied(wildcards):
 rule lips_page:
     """Puts the video beside its result, the warnings and the files on one page: lips.html."""
     input:
-        **({"usd": P.applied + "/corrected.usdc"} if CONFIG.apply.export.usd else {}),
+        **exported_files(P.applied),
         tracker=tracker_of,
         fit=P.fit,
         quality=P.quality,

@@ -12,7 +12,6 @@ HEX = r"^#[0-9a-fA-F]{6}$"
 #: Value of `regressor` with which contours alone move the lips.
 NO_REGRESSOR = "none"
 
-
 ExportFormat = Literal["usd", "usd_shapes", "gltf", "alembic", "obj", "ply"]
 
 

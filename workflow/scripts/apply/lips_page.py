@@ -18,6 +18,9 @@ from vermilion.tracking.result import TrackedTake
 #: Input -> what the file is, and what opens it.
 FILES = {
     "usd": "the corrected mesh, animated: Blender, Maya, Unreal, Houdini",
+    "usd_shapes": "the same as blend shapes (UsdSkel)",
+    "gltf": "the same as morph targets: Blender, Unity, web browsers",
+    "alembic": "the same as Alembic",
     "weights": "blend shape weights a frame, ARKit names: Live Link, spreadsheets",
     "overlay": "original, track and result side by side",
     "corrected": "the vertices of all frames: NumPy (frames, vertices, 3), mm",
