@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run sketch doctor report verify test test-quick lint format docs reference clean
+.PHONY: help setup demo lips run sketch doctor report verify test test-quick test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -18,6 +18,7 @@ help:
 	@echo "make doctor      say what is missing, and what to do about it"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
+	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
 	@echo "make docs        build the documentation site (results/site); also regenerates the"
 	@echo "                 configuration reference and schemas (make reference: these alone)"
@@ -62,6 +63,14 @@ test: test-quick
 test-quick: setup
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m "not slow"
 
+# Not in `make test`: Blender (374 MB), the validators of USD and glTF. What cannot be made is skipped.
+test-interchange: $(READY) $(VENV)-interchange.ready
+	VERMILION_INTERCHANGE=$(VENV)-interchange $(BIN)/python -m pytest -p no:cacheprovider tests/interchange
+
+$(VENV)-interchange.ready: requirements.interchange.lock tools/setup_interchange.sh | $(READY)
+	tools/setup_interchange.sh $(VENV)-interchange $(PYTHON)
+	@touch $@
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -88,5 +97,5 @@ $(DOCS)/.ready: requirements.docs.lock
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV)-mediapipe* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	rm -rf $(VENV) $(VENV)-mediapipe* $(VENV)-interchange* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
