@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run sketch doctor report verify test test-quick test-interchange lint format docs reference clean
+.PHONY: help setup demo lips run cameras sketch doctor report verify test test-quick test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -16,6 +16,7 @@ help:
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
 	@echo "make doctor      say what is missing, and what to do about it"
+	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
@@ -50,6 +51,9 @@ doctor: $(READY)
 
 sketch: $(READY)
 	@$(VERMILION) sketch "$(CONFIG)" "$(TAKE)"
+
+cameras: $(READY)
+	@$(VERMILION) cameras "$(CONFIG)"
 
 report: $(READY)
 	@$(VERMILION) report "$(CONFIG)"

@@ -4,7 +4,7 @@ from functools import cache
 
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import IMAGE_SUFFIXES
-from vermilion.geometry.colmap import model_files
+from vermilion.capture.camera_files.read import camera_files as given_camera_files
 from vermilion.imaging.source import folder_of, is_video
 
 
@@ -23,7 +23,7 @@ def capture_files(source):
 def camera_files(source):
     """The calibration that a capture brings: a COLMAP model, or images of a board."""
     if folder_of(source, "cameras").is_dir():
-        return [str(path) for path in model_files(folder_of(source, "cameras"))]
+        return [str(path) for path in given_camera_files(folder_of(source, "cameras"))]
     views = folder_of(source, "calibration").glob("*/*")
     return sorted(str(path) for path in views if path.suffix.lower() in IMAGE_SUFFIXES)
 

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from vermilion.capture.camera_files.read import read_given_cameras
 from vermilion.capture.checks import check_image, header_size
 from vermilion.capture.video_facts import VideoFacts, rate_warning, video_facts
-from vermilion.geometry.camera import read_cameras
 from vermilion.imaging.frames import list_frames, reading_of
 from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
@@ -214,7 +214,7 @@ def _calibrated_sizes(source: Path) -> dict[str, tuple[int, int]]:
     folder = folder_of(source, "cameras")
     if not folder.is_dir():
         return {}
-    cameras = read_cameras(folder)
+    cameras = read_given_cameras(folder, {}).cameras
     return {name: (camera.width_px, camera.height_px) for name, camera in cameras.items()}
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from vermilion.capture.board import Board, BoardDetector, Corners
 from vermilion.capture.calibrate import Calibration, CalibrationSettings, calibrate_rig
+from vermilion.capture.camera_files.read import read_given_cameras
 from vermilion.capture.manifest import Manifest
-from vermilion.geometry.camera import Camera, pinhole, read_cameras
+from vermilion.geometry.camera import Camera, pinhole
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.images import IMAGE_SUFFIXES, read_image
 from vermilion.imaging.source import Source, folder_of, is_video
@@ -93,7 +94,9 @@ def rig_cameras(
     settings = settings or CalibrationSettings()
     given, calibration = folder_of(source, "cameras"), folder_of(source, "calibration")
     if given.is_dir():
-        cameras = read_cameras(given)
+        found = read_given_cameras(given, sizes)
+        print(*found.understood, sep="\n")
+        cameras = found.cameras
         if is_video(source) and len(cameras) == len(sizes) == 1:  # a video's camera has no name
             name, (camera,) = next(iter(sizes)), cameras.values()
             cameras = {name: replace(camera, name=name)}
@@ -111,8 +114,8 @@ def rig_cameras(
         return RigCameras({name: pinhole(name, focal, width, height)}, "assumed")
     raise InputError(
         f"{len(sizes)} cameras without a calibration",
-        "cameras/ (a COLMAP text model) or calibration/<camera>/ (views of a board)",
-        "Export the rig as COLMAP text, or add ChArUco or checkerboard images.",
+        "cameras/ (COLMAP, Metashape, OpenCV, USD, ...) or calibration/<camera>/ (views of a board)",
+        "Export the rig, for example as COLMAP text, or add ChArUco or checkerboard images.",
         path=given.parent,
         **place,
     )

@@ -1,0 +1,1 @@
+"""Calibrated cameras as other programs write them: Metashape, OpenCV, USD, Multiface, NeRSemble."""
