@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vermilion.config.regressors import in_order, kind_of, measure_name
+from vermilion.config.regressors import in_order, is_shown, is_variant, kind_of, measure_name
 from vermilion.evaluation.contour_error import contour_error, distance_to_polyline
 from vermilion.evaluation.errors import ClipSums
 from vermilion.evaluation.files import load_sums, save_sums
@@ -94,6 +94,27 @@ def test_names_of_regressors(stem, name, kind):
     assert measure_name(stem) == name
     assert kind_of(name) == kind
     assert in_order([name, "base"]) == ["base", name]
+
+
+def test_every_table_has_what_learnt_nothing_and_the_paper_to_the_letter():
+    names = [
+        "MS/rbf",
+        "PS/paper",
+        "PS/neutral",
+        "PS",
+        "null/neutral",
+        "null",
+        "base/neutral",
+        "base",
+    ]
+    assert in_order(names) == names[::-1][:2] + names[::-1][2:4] + [
+        "PS",
+        "PS/neutral",
+        "PS/paper",
+        "MS/rbf",
+    ]
+    assert [name for name in names if is_variant(name)] == ["MS/rbf"]
+    assert [name for name in names if is_shown(name)] == ["PS/neutral", "PS", "null", "base"]
 
 
 def test_sums_survive_their_file(tmp_path):

@@ -145,4 +145,6 @@ def test_a_person_is_judged_by_what_was_trained_and_by_nothing_twice(people, dat
 
 def test_variants_are_made_of_the_kinds_asked_for():
     names = with_variants(["PS-an-na", "MS", "GR-an-na"], ["rbf"], ["MS", "GR"])
-    assert names == ["PS-an-na", "MS", "GR-an-na", "MS-rbf", "GR-an-na-rbf"]
+    own, paper = ["PS-an-na", "MS", "GR-an-na"], ["PS-an-na-paper", "MS-paper", "GR-an-na-paper"]
+    assert names == [*own, *paper, "MS-rbf", "GR-an-na-rbf"]
+    assert with_variants(own, ["paper"], ["MS"]) == [*own, *paper]

@@ -9,6 +9,9 @@ from vermilion.storage.errors import InputError
 
 Estimator = Literal["rbf", "affine", "kernel"]
 
+#: Lips16 to the letter: made of every regressor.
+PAPER = "paper"
+
 #: Variant of a regressor -> (estimator, features); None is the configured estimator.
 VARIANTS: dict[str, tuple[Estimator | None, str]] = {
     "": (None, "all"),
@@ -17,7 +20,7 @@ VARIANTS: dict[str, tuple[Estimator | None, str]] = {
     "kernel": ("kernel", "all"),
     "shape-only": (None, "shape"),
     "distances-only": (None, "distances"),
-    "paper": ("rbf", "all"),
+    PAPER: ("rbf", "all"),
 }
 
 
@@ -77,13 +80,23 @@ def measure_name(file_stem: str) -> str:
 def with_variants(
     names: Sequence[str], variants: Sequence[str], kinds: Collection[str]
 ) -> list[str]:
-    """The names, then every variant of those of them whose kind (PS, MS, GR) is asked for."""
+    """The names, each of them to the letter of Lips16, then every variant of the kinds asked for.
+
+    Args:
+        names: of regressors.
+        variants: names of `VARIANTS`.
+        kinds: PS, MS, GR: whose variants are made.
+    """
     of_kind = [name for name in names if name.split("-", 1)[0] in kinds]
-    return [*names, *(f"{name}-{variant}" for variant in variants for name in of_kind)]
+    made = [f"{name}-{PAPER}" for name in names]
+    made += [f"{name}-{variant}" for variant in variants for name in of_kind]
+    return [*names, *dict.fromkeys(made)]
 
 
 #: In the paper's order; what lies between the table's own columns is ours.
-_ORDER = ("base", "contour", "oracle", "PS", "MS", "GR")
+_ORDER = ("base", "contour", "null", "oracle", "PS", "MS", "GR")
+#: Every table has them: told a neutral, a regressor is the same, told more; `paper` is Lips16's own.
+_NO_VARIANTS = ("", "neutral", "paper")
 
 
 def kind_of(regressor: str) -> str:
@@ -94,11 +107,17 @@ def kind_of(regressor: str) -> str:
 
 
 def is_variant(regressor: str) -> bool:
-    """Whether a row is of another estimator, features or method than the configured ones.
+    """Whether a row is of another estimator or features than the configured ones.
 
-    A regressor told a neutral (`GR/neutral`) is none: it is the same, told more.
+    A regressor told a neutral (`GR/neutral`) is none, nor is that of Lips16 to the letter (`GR/paper`).
     """
-    return regressor.partition("/")[2] not in ("", "neutral")
+    return regressor.partition("/")[2] not in _NO_VARIANTS
+
+
+def is_shown(regressor: str) -> bool:
+    """Whether sheets of renders show a row: no variants, and baselines without a neutral."""
+    kind, _, variant = kind_of(regressor).partition("/")
+    return variant == "" or (variant == "neutral" and kind in ("PS", "MS", "GR"))
 
 
 def in_order(regressors: Iterable[str]) -> list[str]:

@@ -61,6 +61,9 @@ def questions_of(regressor: str) -> list[Question]:
         Question("The configured regressor against Lips16 to the letter", "", "paper"),
         Question("The configured regressor against the contour baseline", "", "=contour"),
         Question("The configured regressor against the base track", "", "=base"),
+        Question("The configured regressor against one that learnt nothing", "", "=null"),
+        Question("Against one that learnt nothing, told the neutral", "", "=null/neutral"),
+        Question("Both told the neutral", "neutral", "=null/neutral"),
         Question("The neutral known against unknown", "neutral", ""),
         Question("The neutral known against the base track", "neutral", "=base"),
     ]

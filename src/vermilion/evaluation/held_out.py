@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.config.regressors import is_variant
+from vermilion.config.regressors import is_shown
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, Corrector
 from vermilion.evaluation.contour_error import contour_error
@@ -118,7 +118,7 @@ def shown_arrays(
     tracker: FaceModel,
     camera: Camera,
 ) -> dict[str, np.ndarray]:
-    """What the sheets of renders need, of the `count` frames that the report shows; no variants.
+    """What the sheets of renders need, of the `count` frames that the report shows (`is_shown`).
 
     Args:
         neutral_mm: (V, 3) of the base track.
@@ -133,8 +133,8 @@ def shown_arrays(
     base = result.table.loc[result.table["regressor"] == "base", "mouth_mm"].to_numpy()
     chosen = shown_rows(base, count)
     head = result.head[chosen]
-    names = [name for name in result.aligned_mm if not is_variant(name)]
-    of_truth = {"base": neutral_mm, "contour": neutral_mm}
+    names = [name for name in result.aligned_mm if is_shown(name)]
+    of_truth = {"base": neutral_mm, "contour": neutral_mm, "null": neutral_mm}
     used = np.unique(reference.triangles)
     lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]
     local = camera.to_camera(take.coarse_mm[chosen][:, lips].mean(axis=1))

@@ -31,7 +31,9 @@ from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity
 
 SUBJECT = "ana"
-MODELS = ("PS-ana", "MS", "GR-ana", "MS-rbf", "MS-affine", "MS-shape-only", "MS-distances-only")
+MODELS = (
+    "PS-ana", "MS", "GR-ana", "MS-paper", "MS-rbf", "MS-affine", "MS-shape-only", "MS-distances-only",
+)  # fmt: skip
 CFG = {
     "evaluation.reference": ReferenceConfig().model_dump(),
     "evaluation.measures": MeasuresConfig(bootstrap_samples=200).model_dump(),

@@ -26,7 +26,8 @@ def values(root, name, region="mouth", measure="vertex_error_mean_mm"):
 def test_corrections_are_between_the_base_and_the_oracle(scene):
     error = values(scene.root, "truth")
     assert set(error.index) == {
-        "base", "oracle", "contour", "PS-ana", "MS", "GR-ana",
+        "base", "oracle", "contour", "null", "PS-ana", "MS", "GR-ana", "MS/paper",
+        "base/neutral", "contour/neutral", "null/neutral",
         "PS-ana/neutral", "MS/neutral", "GR-ana/neutral",
         *(f"MS/{variant}" for variant in ("rbf", "affine", "shape-only", "distances-only")),
     }  # fmt: skip
@@ -35,6 +36,13 @@ def test_corrections_are_between_the_base_and_the_oracle(scene):
         assert error["oracle"] < error[regressor] < error["base"]
     # Identity is the larger part of an unseen subject's error; one frame supplies it.
     assert error["GR-ana/neutral"] < 0.9 * error["GR-ana"]
+    # Without an image, what learnt nothing adds nothing, but for what a neutral tells.
+    assert error["null"] == pytest.approx(error["base"], abs=0.02)
+    assert error["null/neutral"] == pytest.approx(error["base/neutral"], abs=0.02)
+    assert error["null/neutral"] < 0.9 * error["base"]
+    motion = values(scene.root, "truth", "vermilion", "lip_motion_error_mm")
+    assert motion["MS"] < 0.8 * motion["null"]
+    assert motion["MS"] < motion["null/neutral"]
     feature = values(scene.root, "truth", measure="feature_error")
     assert (feature > 0).all()
 

@@ -83,7 +83,7 @@ def test_every_comparison_of_section_6_is_there(tables):
     assert {
         ("MS/rbf", "MS/affine"), ("MS", "MS/shape-only"), ("MS", "MS/distances-only"),
         ("MS", "MS/rbf"), ("GR", "contour"), ("PS", "base"), ("GR/neutral", "GR"),
-        ("MS/neutral", "MS"),
+        ("MS/neutral", "MS"), ("MS", "null"), ("PS", "null/neutral"), ("GR/neutral", "null/neutral"),
     } <= pairs  # fmt: skip
     assert set(rows["measure"]) == {"vertex_error_mean_mm", "lip_motion_error_mm", "feature_error"}
     features = read_table(tables / "table2.tsv")
@@ -98,8 +98,8 @@ def test_every_comparison_of_section_6_is_there(tables):
 
 def test_sheets_have_a_column_a_mesh(tables):
     size = CFG["evaluation.figures"]["map_size_px"]
-    # base, contour, oracle; PS, MS, GR, and told the neutral; truth
-    columns = {"maps": 9, "renders": 11, "stretch": 10}
+    # base, contour, null, oracle; PS, MS, GR, and told the neutral; truth
+    columns = {"maps": 10, "renders": 12, "stretch": 11}
     for name, count in columns.items():
         image = cv2.imread(str(tables / SHEETS[name]))
         assert image.shape[1] == count * size, name

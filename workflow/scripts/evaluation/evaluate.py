@@ -7,11 +7,13 @@ import numpy as np
 
 from vermilion.baselines.contour_tracker import ContourTracker
 from vermilion.baselines.lip_shapes import LipShapes
+from vermilion.baselines.null import NAME as NULL
+from vermilion.baselines.null import null_model
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.config.regressors import measure_name
 from vermilion.correction.coarse_take import CoarseTake
-from vermilion.correction.correct import CorrectionSettings, correct_with_layers
+from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
 from vermilion.correspondence.correspondence import Correspondence
@@ -27,7 +29,7 @@ from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
 from vermilion.regression.model import load_model
-from vermilion.storage.arrays import write_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -96,18 +98,34 @@ def oracle(inputs, correspondence, take, settings, rows):
     return meshes[rows], held_out.TrueLayers(mask, given["layers"][rows], given["valid"][rows])
 
 
-def regressors(inputs, take, settings, rows):
+def regressors(inputs, take, settings, rows, null):
     """Name -> what each model makes of the `rows` of a take; also told the neutrals that are known."""
     regressed = {}
     pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
-    for path in inputs.models:
-        name, model = measure_name(Path(path).stem), load_model(path)
+    models = {measure_name(Path(path).stem): load_model(path) for path in inputs.models}
+    for name, model in {NULL: null, **models}.items():
         chosen = settings.as_in_the_paper() if name.endswith("/paper") else settings
         regressed[name] = held_out.Regressed.of(model, take, chosen, rows)
         known = model if "/" in name else with_known_neutrals(model, take.triangles, *pairs)
         if known is not model:
             regressed[f"{name}/neutral"] = held_out.Regressed.of(known, take, chosen, rows)
     return regressed
+
+
+def told_the_neutral(tracks, take, settings, regressed):
+    """`base/neutral` and `contour/neutral`: the tracks (F, V, 3) with what the neutrals correct.
+
+    Nothing else: neither layers of the frame nor the image.
+    """
+    if f"{NULL}/neutral" not in regressed:
+        return {}
+    known = regressed[f"{NULL}/neutral"].model
+    return {
+        f"{name}/neutral": correct(
+            known, replace(take, coarse_mm=meshes), settings.as_in_the_paper()
+        )
+        for name, meshes in tracks.items()
+    }
 
 
 def contour_track(inputs, tracker, fit, take, correspondence, contours, cfg):
@@ -138,7 +156,7 @@ def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
 
 
 def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
-    """The frames' coarse take, what each regressor makes of it, and the oracle's meshes and layers."""
+    """The frames' coarse take, what regressors make of it, the oracle's meshes and layers, settings."""
     section = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
@@ -148,8 +166,11 @@ def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
         frames, section.reach_frames(fps),
     )  # fmt: skip
     rows = np.searchsorted(take.frames, frames)
-    regressed = regressors(inputs, take, settings, rows)
-    return take[rows], regressed, *oracle(inputs, correspondence, take, settings, rows)
+    names = read_arrays(inputs.features[0], "features", ["names"])["names"].tolist()
+    null = null_model(tracker.triangles, correspondence.mask, names)
+    regressed = regressors(inputs, take, settings, rows, null)
+    by_truth = oracle(inputs, correspondence, take, settings, rows)
+    return take[rows], regressed, *by_truth, settings
 
 
 def main(snakemake):
@@ -161,12 +182,14 @@ def main(snakemake):
     fit, asked = TrackedTake.load(inputs.fit), np.array(snakemake.params.frames)
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
-    take, regressed, by_truth, true = corrected_takes(
+    take, regressed, by_truth, true, settings = corrected_takes(
         inputs, tracker, fit, correspondence, cfg, frames, snakemake.params.fps
     )
     contours = read_chunks(inputs.features, frames, CONTOURS)
-    sequences = {"base": take.coarse_mm} | ({} if by_truth is None else {"oracle": by_truth})
+    sequences = {"base": take.coarse_mm}
     sequences["contour"] = contour_track(inputs, tracker, fit, take, correspondence, contours, cfg)
+    sequences |= told_the_neutral(sequences, take, settings, regressed)
+    sequences |= {} if by_truth is None else {"oracle": by_truth}
     sequences |= {name: of_model.corrected_mm for name, of_model in regressed.items()}
     regions = regions_of_mask(tracker, correspondence.coarse_neutral_mm, correspondence.mask)
     against = reference(snakemake, tracker, correspondence, frames, place)
