@@ -20,7 +20,10 @@ from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, smoothed_motion
+from vermilion.correction.surface_quality import LipSurface
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.cotangents import bending_stiffness
+from vermilion.geometry.mesh import unique_edges
 from vermilion.geometry.rotations import rotation_matrix
 
 N_SAMPLES = 80
@@ -90,8 +93,10 @@ def depth_in_other_lip(mesh_mm):
     return LipCrossings(FACE).find(mesh_mm).deepest_mm
 
 
-def test_low_rank_update_is_the_minimum_of_the_whole_energy():
+@pytest.mark.parametrize("bending_mm", [0.0, 6.0])
+def test_low_rank_update_is_the_minimum_of_the_whole_energy(bending_mm):
     solid, rng = integrator(), np.random.default_rng(0)
+    plate = bending_mm**2 * bending_stiffness(FACE.neutral_mm, FACE.triangles, solid.free)
     vertices = rng.choice(solid.free, size=(12, 2), replace=False)
     directions = rng.normal(size=(12, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -99,7 +104,7 @@ def test_low_rank_update_is_the_minimum_of_the_whole_energy():
         vertices, rng.uniform(0.2, 1, (12, 2)), directions, rng.normal(size=12),
         rng.uniform(0.1, 2, 12), np.zeros(12, dtype=bool),
     )  # fmt: skip
-    solver = ConstraintSolver(solid, np.unique(vertices))
+    solver = ConstraintSolver(solid, np.unique(vertices), plate if bending_mm else None)
     forces = solver.forces(rows)
     move = np.zeros((FACE.n_vertices, 3))
     move[solid.free] = solver.displacements([rows], [forces])[0]
@@ -108,10 +113,48 @@ def test_low_rank_update_is_the_minimum_of_the_whole_energy():
         for vertex, share in zip(pair, shares, strict=True):
             jacobian[i, 3 * vertex : 3 * vertex + 3] += share * directions[i]
     pull = jacobian.T @ ((rows.target_mm - jacobian @ move.ravel()) / rows.compliance)
-    balance = solid.matrix @ move[solid.free] - pull.reshape(-1, 3)[solid.free]
+    balance = (solid.matrix + plate) @ move[solid.free] - pull.reshape(-1, 3)[solid.free]
     assert np.abs(balance).max() < 1e-8
     near = solver.displacements_at(vertices.ravel(), rows, forces)
     np.testing.assert_allclose(near, move[vertices.ravel()], atol=1e-9)
+
+
+def test_a_pulled_membrane_has_a_tip_and_a_bent_lip_has_none():
+    """Displacement of a vertex that is pulled, over the mean of its neighbours'."""
+    solid = integrator()
+    vertex = solid.free[len(solid.free) // 2]
+    edges = unique_edges(FACE.triangles)
+    around = edges[(edges == vertex).any(axis=1)]
+    around = around[around != vertex]
+    pull = LinearConstraints(
+        np.array([[vertex]]), np.ones((1, 1)), np.array([[0, 1.0, 0]]), np.array([1.0]),
+        np.zeros(1), np.zeros(1, dtype=bool),
+    )  # fmt: skip
+    tips = []
+    for bending_mm in (0.0, 6.0):
+        plate = bending_mm**2 * bending_stiffness(FACE.neutral_mm, FACE.triangles, solid.free)
+        solver = ConstraintSolver(solid, np.append(around, vertex), plate)
+        forces = solver.forces(pull)
+        moved = solver.displacements([pull], [forces])[0][:, 1]
+        whole = np.zeros(FACE.n_vertices)
+        whole[solid.free] = moved
+        tips.append(whole[vertex] / whole[around].mean())
+    assert tips[0] > 1.5
+    assert tips[1] < 1.1
+
+
+def test_noise_of_the_found_contours_leaves_no_ragged_edge():
+    before = np.stack([lip_patch.vertices_at(0.6, 0.0)] * 3)
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)] * 3)
+    noise = np.random.default_rng(2).normal(scale=1.0, size=image.inner_px.shape)
+    image = replace(image, inner_px=image.inner_px + noise, outer_px=image.outer_px - noise)
+    on = replace(DEFAULTS, repose=False)
+    ragged = [
+        LipSurface(FACE).measure(fitted(before, image, settings), before, CAMERA)
+        for settings in (on, replace(on, bending_mm=0.0))
+    ]
+    assert ragged[0].roughness_mm.mean() < 0.5 * ragged[1].roughness_mm.mean()
+    assert not ragged[0].flipped.any() and not ragged[0].inner_mouth.any()
 
 
 def test_a_one_sided_row_never_pulls():
@@ -129,9 +172,11 @@ def test_a_one_sided_row_never_pulls():
 def test_contours_go_to_their_lines_and_depth_stays():
     before = lip_patch.vertices_at(0.6, 0.0)
     image = image_of([lip_patch.vertices_at(1.8, 0.08)])
-    after = fitted(before[None], image, CONTOURS)[0]
     assert distance_px(before, image).max() > 2.0
-    assert distance_px(after, image).max() < 0.1
+    membrane = fitted(before[None], image, replace(CONTOURS, bending_mm=0.0))[0]
+    assert distance_px(membrane, image).max() < 0.1
+    after = fitted(before[None], image, CONTOURS)[0]  # a plate does not turn at the corners
+    assert distance_px(after, image).mean() < 0.1
     moved = after - before
     lips = np.unique(np.concatenate([FACE.outer_contour, FACE.inner_contour]))
     view = before[lips] - CAMERA.centre_mm

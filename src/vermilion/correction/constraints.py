@@ -1,7 +1,7 @@
 """Soft linear constraints on few vertices of an integrated mesh, by a low-rank update (Woodbury).
 
-The integration's energy is (x - x0)^T A (x - x0) about its solution x0, the same A for all three
-coordinates. With rows  d_i . sum_a c_ia (x - x0)_(v_ia) = r_i  of compliance s_i (the inverse of a
+The energy about the integration's solution x0 is (x - x0)^T A (x - x0), the same A for all three
+coordinates: that of the integration, and what is added to it. With rows  d_i . sum_a c_ia (x - x0)_(v_ia) = r_i  of compliance s_i (the inverse of a
 weight beside the mesh's stiffness), the minimum is
 
     x = x0 + A^-1 J^T l,      (S + diag(s)) l = r,      S_ij = (d_i . d_j) sum_ab c_ia G_(v_ia, v_jb) c_jb
@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.correction.integration import LayerIntegrator
+from vermilion.geometry.sparse import CholeskyFactor
 
 _ROUNDS = 10
 #: Keeps the system definite where exact constraints repeat each other.
@@ -76,12 +77,22 @@ class ConstraintSolver:
     """Adds constraints to the solutions of an integrator.
 
     Args:
-        integrator: whose factor is used.
+        integrator: whose free vertices move, at the cost of its energy.
         vertices: (K,) ids that constraints may name.
+        stiffness: (N, N) sparse, of its free vertices: added to its energy; None: the integrator's factor
+            serves.
     """
 
-    def __init__(self, integrator: LayerIntegrator, vertices: np.ndarray):
+    def __init__(
+        self,
+        integrator: LayerIntegrator,
+        vertices: np.ndarray,
+        stiffness: sparse.sparray | None = None,
+    ):
         self._integrator = integrator
+        self._factor = integrator.factor
+        if stiffness is not None:
+            self._factor = CholeskyFactor(integrator.matrix + stiffness)
         n_free, n_all = len(integrator.free), int(max(vertices.max(), integrator.free.max())) + 1
         row = np.full(n_all, n_free)
         row[integrator.free] = np.arange(n_free)
@@ -92,7 +103,7 @@ class ConstraintSolver:
         self._place = np.full(n_all, len(named))  # one more for vertices that cannot move
         self._place[named] = np.arange(len(named))
         self._inverse = np.zeros((len(named) + 1, len(named) + 1))
-        self._inverse[:-1, :-1] = integrator.factor.solve(units)[self._named_rows]
+        self._inverse[:-1, :-1] = self._factor.solve(units)[self._named_rows]
 
     def forces(self, constraints: LinearConstraints) -> np.ndarray:
         """Forces l (m,) along the constraints; 0 where a one-sided one would have to pull back."""
@@ -120,7 +131,7 @@ class ConstraintSolver:
         for f, (of_frame, strength) in enumerate(zip(constraints, forces, strict=True)):
             pushes = self._shares(of_frame).T @ (strength[:, None] * of_frame.directions)
             right[self._named_rows, :, f] = pushes[:-1]
-        return np.moveaxis(self._integrator.factor.solve(right), 2, 0)
+        return np.moveaxis(self._factor.solve(right), 2, 0)
 
     def _shares(self, constraints: LinearConstraints) -> sparse.csr_matrix:
         """(m, K + 1): each constraint's coefficients at the named vertices."""

@@ -26,6 +26,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import interocular_px
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
+from vermilion.geometry.cotangents import bending_stiffness
 from vermilion.geometry.head_frame import world_from_head
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.landmarks.scheme import EYE_CORNERS
@@ -45,6 +46,8 @@ class ImageAgreementSettings:
         repose: whether the corrected head is laid on the image again.
         repose_frames: deviation of the symmetric filter over time of that motion, frames.
         contour_weight: of a millimetre of contour beside the mesh's stiffness.
+        bending_mm: over shorter lengths than this the lips bend as a plate, over longer ones they stretch as
+            a membrane, where contours and contact move them; 0: a membrane alone.
         contour_robust_mm: a contour point this far off counts half.
         closed_gap_iod: lips touch where the inner contour is lower than this, per inter-ocular distance.
         contact: whether lips that touch in the image meet, and never pass through each other.
@@ -53,6 +56,7 @@ class ImageAgreementSettings:
     repose: bool
     repose_frames: float
     contour_weight: float
+    bending_mm: float
     contour_robust_mm: float
     closed_gap_iod: float
     contact: bool
@@ -94,7 +98,12 @@ class ImageAgreement:
             *(part.points.vertices(face.triangles) for part in (self._samples, self._occluding))
         )
         self._lips = np.intersect1d(lips, integrator.free)
-        self._solver = ConstraintSolver(integrator, np.union1d(lips, self._crossings.vertices))
+        named = np.union1d(lips, self._crossings.vertices)
+        # A membrane that few points pull has a tip at each: the lips must bend, not tear.
+        plate = settings.bending_mm**2 * bending_stiffness(
+            neutral_mm, face.triangles, integrator.free
+        )
+        self._solver = ConstraintSolver(integrator, named, plate if settings.bending_mm else None)
 
     def fit(self, head_mm: np.ndarray, take: CoarseTake, image: ImageContours) -> np.ndarray:
         """Meshes that agree with their images.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from vermilion.geometry.mesh import vertex_areas
+
 _COTANGENT_RANGE = (0.02, 50.0)
 
 
@@ -48,3 +50,26 @@ def edge_stiffness(
     columns = np.concatenate([first, second, second, first])
     data = np.concatenate([values, values, -values, -values])
     return sparse.csr_matrix((data, (rows, columns)), shape=(n_vertices, n_vertices))
+
+
+def bending_stiffness(
+    vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray
+) -> sparse.csr_matrix:
+    """Matrix of a thin plate's energy, |Laplacian x|^2 over the surface, of some vertices.
+
+    A membrane (`edge_stiffness`) that is pulled at a point rises to a tip there; a plate bends evenly.
+
+    Args:
+        vertices: (V, 3), mm.
+        triangles: (T, 3).
+        free: (N,) ids of the vertices that move; the others stay.
+
+    Returns:
+        (N, N) sparse, symmetric, 1 / mm2 times the unit of `edge_stiffness`.
+    """
+    moves = np.zeros(len(vertices), dtype=bool)
+    moves[free] = True
+    near = triangles[moves[triangles].any(axis=1)]
+    stiffness = edge_stiffness(near, cotangents(vertices, near), len(vertices))[:, free]
+    areas = np.maximum(vertex_areas(vertices, near), 1e-6)
+    return sparse.csr_matrix(stiffness.T @ sparse.diags_array(1.0 / areas) @ stiffness)
