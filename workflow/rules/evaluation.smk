@@ -302,6 +302,7 @@ rule measures:
         kinds=in_report(P.kinds, "Tables", "kinds", table="kinds of mouth shapes"),
         seconds=P.seconds,
         comparisons=P.comparisons,
+        headline=in_report(P.headline, "Tables", "headline", table="headline"),
         table2=P.table2,
         table3=P.table3,
         estimators=P.estimators,

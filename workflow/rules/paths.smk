@@ -153,6 +153,7 @@ class P:
     kinds = _EVALUATION + "/kinds.tsv"
     seconds = _EVALUATION + "/seconds.tsv"
     comparisons = _EVALUATION + "/comparisons.tsv"
+    headline = _EVALUATION + "/headline.tsv"
     table1 = _EVALUATION + "/table1.tsv"
     table1_figure = _EVALUATION + "/table1.png"
     table2 = _EVALUATION + "/table2.tsv"

@@ -142,6 +142,7 @@ rule summary:
         table1=P.table1,
         kinds=P.kinds,
         comparisons=P.comparisons,
+        headline=P.headline,
         table2=P.table2,
         table3=P.table3,
         estimators=P.estimators,

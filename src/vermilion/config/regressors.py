@@ -116,8 +116,13 @@ def is_variant(regressor: str) -> bool:
 
 def is_shown(regressor: str) -> bool:
     """Whether sheets of renders show a row: no variants, and baselines without a neutral."""
+    return "/" not in regressor or is_judged(regressor)
+
+
+def is_judged(regressor: str) -> bool:
+    """Whether a row is a configured regressor's, told a neutral or not: no baseline, no variant."""
     kind, _, variant = kind_of(regressor).partition("/")
-    return variant == "" or (variant == "neutral" and kind in ("PS", "MS", "GR"))
+    return kind in ("PS", "MS", "GR") and variant in ("", "neutral")
 
 
 def in_order(regressors: Iterable[str]) -> list[str]:

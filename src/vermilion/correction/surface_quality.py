@@ -7,7 +7,6 @@ edge roughness      how ragged the inner edge of the lips is in the image, besid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -221,8 +220,3 @@ def surface_figures(quality: SurfaceQuality, row: int) -> dict[str, float]:
         "inner_mouth_share": float(quality.hidden_share[row]),
         "edge_roughness_ratio": float(quality.roughness_ratio[row]),
     }
-
-
-def joined_reasons(*reasons: Sequence[str]) -> list[str]:
-    """Several reasons of each of F frames as one, without the empty ones."""
-    return ["; ".join(filter(None, of_frame)) for of_frame in zip(*reasons, strict=True)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vermilion.correction.surface_quality import SurfaceQuality
 from vermilion.evaluation.lips import LipTolerances, aperture_mm
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.reference import Reference
@@ -170,6 +171,22 @@ def sums_of_frames(name: str, values: np.ndarray, clips: np.ndarray) -> ClipSums
             name: by_clip(np.where(known, values, 0.0), clips),
         }
     )
+
+
+def sums_of_surface(lips: SurfaceQuality, clips: np.ndarray) -> ClipSums:
+    """Sums behind `flipped_rate`, `inner_mouth_rate` and `edge_roughness_ratio`, of F frames.
+
+    Args:
+        lips: of the same frames.
+        clips: (F,) clip of each frame.
+    """
+    sums = sums_of_frames("vermilion.flipped", lips.flipped.astype(float), clips)
+    sums += sums_of_frames("vermilion.inner_mouth", lips.inner_mouth.astype(float), clips)
+    rough = {
+        "vermilion.roughness": by_clip(lips.roughness_mm, clips),
+        "vermilion.base_roughness": by_clip(lips.base_roughness_mm, clips),
+    }
+    return sums + ClipSums(rough)
 
 
 def sums_by_region(name: str, values: np.ndarray, regions: Regions, clips: np.ndarray) -> ClipSums:

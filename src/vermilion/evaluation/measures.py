@@ -27,6 +27,9 @@ _RATIOS = (
     ("aperture_error_mm", "aperture", "aperture_frames", "mm"),
     ("false_open_rate", "false_open", "touch_frames", "1"),
     ("lip_penetration_rate", "through", "through_frames", "1"),
+    ("flipped_rate", "flipped", "flipped_frames", "1"),
+    ("inner_mouth_rate", "inner_mouth", "inner_mouth_frames", "1"),
+    ("edge_roughness_ratio", "roughness", "base_roughness", "1"),
     ("contour_error_px", "contour", "contour_frames", "px per px of inter-ocular distance"),
 )
 #: measure, numerator, denominator: the ratio of two sums over that of the base track.

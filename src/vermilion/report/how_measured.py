@@ -41,7 +41,9 @@ subject without training frames is measured with GR alone. <i>PS/neutral</i>, <i
 <i>GR/neutral</i> are the same regressors with one addition: they know the error of the track on one neutral
 frame (D of Lips16 eq. 1). That frame is marked in the video itself (<code>correction.neutral_frames</code>);
 for GR it may also come from the subject's rig take. They know nothing about how the subject moves. Frames that
-failed in an earlier stage train no regressor.</p>
+failed in an earlier stage train no regressor. <i>null</i> has learnt nothing: zero layers, on the same path;
+<i>null/neutral</i> knows the neutrals that are known, <i>base/neutral</i> and <i>contour/neutral</i> are these tracks with
+that correction alone. <i>PS/paper</i>, <i>MS/paper</i> and <i>GR/paper</i> are Lips16 to the letter.</p>
 """
 
 _TEXT = """
@@ -60,8 +62,10 @@ percentile is weighted by the area of the neutral.</p>
 <p><b>Measures.</b> Vertex error: distance to the corresponding point. Surface error: distance to the
 nearest point of the true surface. Gap: lowest point of the upper lip minus highest point of the lower lip, in
 seven columns of the middle half of the mouth, in the head frame. Jitter: mean second difference over
-time, minus that of the truth. Motion error: vertex error after each vertex's mean offset over the frames of the
-take is removed, in the head frame. Contour error: distance of contour points found in the image to the outer
+time, minus that of the truth. Lip motion, the headline: over the vermilion, vertex
+error after each vertex's mean offset over the frames of the take is removed, in the head frame. Lip shape: vertex error over
+the vermilion after alignment on the mouth region alone. LVE: mean over frames of the largest squared vertex error over the
+vermilion. Flipped, inner mouth, edge roughness: docs/measures.md. Contour error: distance of contour points found in the image to the outer
 contour of the mesh, and to the parts of its lips that hide the mouth there, per inter-ocular distance. Lip
 penetration: share of frames in which one lip lies deeper in the other than
 <code>evaluation.measures.through_mm</code>. Feature error: RMS of regressed against true layer entries.</p>

@@ -10,6 +10,7 @@ import pandas as pd
 
 from vermilion.config.regressors import in_order, is_variant
 from vermilion.report import lips16_sections, page
+from vermilion.report.headline import learning_sentences
 from vermilion.report.how_measured import how_measured
 from vermilion.report.table1 import place_of
 
@@ -35,7 +36,7 @@ class SummaryInputs:
     """What the page shows.
 
     Attributes:
-        measures, table1, kinds, flagged: tables.
+        measures, headline, table1, kinds, flagged: tables.
         comparisons, table2, table3, estimators: tables; configured: the estimator of the configuration.
         table1_image, figure16: files.
         renders, stretch, error_maps, over_time, curve_images: (name, file) pairs.
@@ -47,6 +48,7 @@ class SummaryInputs:
     """
 
     measures: pd.DataFrame
+    headline: pd.DataFrame
     table1: pd.DataFrame
     kinds: pd.DataFrame
     flagged: pd.DataFrame
@@ -79,6 +81,7 @@ def summary_page(found: SummaryInputs, embed_video_mb: float) -> str:
         "Lips: what was built and how accurate it is",
         f"{takes} takes, {total} frames. Everything on this page is also a TSV file beside it.",
         [
+            ("What learning brings", _learning(found)),
             ("Key figures", _key_figures(found)),
             ("What the comparisons say", lips16_sections.comparison_section(
                 found.comparisons, found.estimators, found.table1, found.configured)),
@@ -124,16 +127,39 @@ _MAP_CAPTION = (
 )
 
 
+def _learning(found: SummaryInputs) -> str:
+    """First lines of the page: what learning brings over a regressor that learnt nothing."""
+    if found.headline.empty:
+        return ""
+    sentences = learning_sentences(found.headline, found.comparisons)
+    items = "".join(f"<li>{page.text(sentence)}</li>" for sentence in sentences)
+    headings = {
+        "regressor": "regressor", "lip_motion_mm": "lip motion, mm", "lip_motion_ratio": "of base",
+        "over_null": "of null", "null": "which null", "aperture_mm": "opening, mm", "aperture_ratio": "of base",
+        "contour_error_px": "contours", "vertex_error_mm": "vertices over the mouth, mm",
+        "ratio_to_base": "of base", "lip_shape_mm": "lip shape, mm", "lve_mm2": "LVE, mm2",
+        "flipped_rate": "flipped", "inner_mouth_rate": "inner mouth before lips",
+        "edge_roughness_ratio": "edge roughness of base", "frames": "frames",
+    }  # fmt: skip
+    return (
+        f"<ul>{items}</ul><p><i>null</i> has learnt nothing: its layers are zero, on the same path, told the same "
+        "neutral, laid on the same image. What does not beat it is not owed to learning.</p>"
+        + page.table(found.headline, headings)
+    )
+
+
 def _key_figures(found: SummaryInputs) -> str:
     items = []
-    rows = _together(found.table1).set_index("regressor")
-    for name in in_order(name for name in rows.index if not is_variant(name)):
+    rows = found.headline.set_index("regressor")
+    for name in rows.index:
         row = rows.loc[name]
         if name == "base":
-            items.append((f"{row['mean_mm']:.2f} mm", "base track, mean error over the mouth"))
+            items.append(
+                (f"{row['lip_motion_mm']:.2f} mm", "base track, error of the lips' motion")
+            )
         else:
-            ratio = f"{row['ratio_to_base']:.2f}"
-            items.append((ratio, f"of base: {name} ({row['mean_mm']:.2f} mm)"))
+            ratio = f"{row['lip_motion_ratio']:.2f}"
+            items.append((ratio, f"of base: {name} ({row['lip_motion_mm']:.2f} mm)"))
     h = _value(found.measures, "surface_error_median_mm", "vermilion", "H")
     if h is not None:
         items.append((f"{h:.2f} mm", "H, median surface error over the vermilion"))

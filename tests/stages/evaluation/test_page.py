@@ -12,6 +12,7 @@ from tests.stages.lip_scene import CHUNKS, TEST
 from tests.stages.run_script import run_script
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.images import write_srgb8
+from vermilion.report.headline import closing_table
 from vermilion.storage.tables import read_table
 
 pytestmark = pytest.mark.slow
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.slow
 #: Tables and figures of all takes together, file names by output.
 TOGETHER = {
     "measures": "measures.tsv", "seconds": "seconds.tsv", "kinds": "kinds.tsv", "table1": "table1.tsv", "table2": "table2.tsv",
-    "table3": "table3.tsv", "comparisons": "comparisons.tsv", "estimators": "estimators.tsv",
+    "table3": "table3.tsv", "comparisons": "comparisons.tsv", "headline": "headline.tsv", "estimators": "estimators.tsv",
     "image": "table1.png", "figure16": "figure16.png",
 }  # fmt: skip
 #: Images of a take.
@@ -96,6 +97,22 @@ def test_every_comparison_of_section_6_is_there(tables):
     assert set(read_table(tables / "estimators.tsv")["estimator"]) == {"rbf", "affine", "kernel"}
 
 
+def test_headline_holds_every_regressor_against_one_that_learnt_nothing(tables):
+    rows = read_table(tables / "headline.tsv").set_index("regressor")
+    assert rows.index.tolist() == [
+        "base", "base/neutral", "contour", "contour/neutral", "null", "null/neutral", "oracle",
+        "PS", "PS/neutral", "MS", "MS/neutral", "MS/paper", "GR", "GR/neutral",
+    ]  # fmt: skip
+    assert rows.loc[["PS", "MS", "GR/neutral"], "null"].tolist() == ["null/neutral"] * 3
+    assert rows.loc["GR", "null"] == "null"
+    expected = rows.loc["MS", "lip_motion_mm"] / rows.loc["null/neutral", "lip_motion_mm"]
+    assert rows.loc["MS", "over_null"] == pytest.approx(expected)
+    assert rows.loc["base", "lip_motion_ratio"] == 1.0
+    assert rows["flipped_rate"].drop("base").notna().all()
+    text = closing_table(read_table(tables / "headline.tsv"))
+    assert " ".join(text.splitlines()[0].split()).startswith("lip motion, mm of base of null")
+
+
 def test_sheets_have_a_column_a_mesh(tables):
     size = CFG["evaluation.figures"]["map_size_px"]
     # base, contour, null, oracle; PS, MS, GR, and told the neutral; truth
@@ -117,6 +134,7 @@ def test_page_is_whole_and_needs_no_network(scene, tables):
     write_page(root, tables)
     page = (tables / "summary.html").read_text(encoding="utf-8")
     for text in (
+        "What learning brings", "MS: of the lips' motion".replace("'", "&#x27;"),
         "not tracked, so not measured", "PS-ana", "RBF network against affine map",
         "Table 2: cross-validation error", "Table 3: tracking error", "trained on",
         'href="../takes/ana/rom/multiview/report.html"',

@@ -8,6 +8,7 @@ from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct, correct_by_image
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
+from vermilion.correction.surface_quality import LipSurface, surface_figures
 from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.neutral import model_mouth_mask
 from vermilion.export.shots import framing, overlay_frames
@@ -23,14 +24,15 @@ from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
 
 
-def quality_row(frame, tracked, has_features, figures):
-    """What a user should know of a frame; one outside the training's span stays valid."""
+def quality_row(frame, tracked, has_features, figures, surface):
+    """What a user should know of a frame; one outside the training's span, or with torn lips, stays valid."""
     if not tracked:
         return QualityRow(frame, False, "not tracked: the neighbours' pose, uncorrected", figures)
     if not has_features:
         return QualityRow(frame, False, "no contour features: the base track, uncorrected", figures)
     outside = figures["novelty"] > figures["novelty_limit"]
-    return QualityRow(frame, True, "outside the training's span" if outside else "", figures)
+    reasons = ["outside the training's span" if outside else "", surface]
+    return QualityRow(frame, True, "; ".join(filter(None, reasons)), figures)
 
 
 def corrected_take(inputs, tracker, fit, cfg, frames, fps):
@@ -78,6 +80,8 @@ def main(snakemake):
     has_features = np.isfinite(take.features).all(axis=1)
     novelty, novelty_limit = novelty_of(model, take)
     moved = np.linalg.norm(corrected - take.coarse_mm, axis=2).max(axis=1)
+    lips = LipSurface(tracker).measure(corrected, take.coarse_mm, fit.camera)
+    surface = lips.reasons()
     rows_of_quality = [
         quality_row(
             int(frame), bool(take.valid[i]), bool(has_features[i]),
@@ -85,7 +89,9 @@ def main(snakemake):
                 "novelty": novelty[i],
                 "novelty_limit": novelty_limit,
                 "largest_correction_mm": moved[i],
+                **surface_figures(lips, i),
             },
+            surface[i],
         )
         for i, frame in enumerate(frames)
     ]  # fmt: skip

@@ -11,13 +11,15 @@ from vermilion.baselines.null import NAME as NULL
 from vermilion.baselines.null import null_model
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
-from vermilion.config.regressors import measure_name
+from vermilion.config.regressors import is_judged, measure_name
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
+from vermilion.correction.surface_quality import LipSurface
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation import held_out
+from vermilion.evaluation.errors import sums_of_surface
 from vermilion.evaluation.files import save_sums
 from vermilion.evaluation.lips import LipTolerances
 from vermilion.evaluation.masks import regions_of_mask
@@ -155,6 +157,30 @@ def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
     return sums
 
 
+def surfaces(sequences, take, tracker, camera):
+    """Quality of the surface of every sequence's lips, beside the base track's, by name."""
+    lips = LipSurface(tracker)
+    return {
+        name: lips.measure(sequence, take.coarse_mm, camera)
+        for name, sequence in sequences.items()
+        if name != "base"
+    }
+
+
+def quality_rows(asked, tracked, surface):
+    """A row a frame that was asked for: not tracked, or what is wrong with the corrected lips, and of whom."""
+    told = {name: of.reasons() for name, of in surface.items() if is_judged(name)}
+    rows, f = [], 0
+    for frame, ok in zip(asked, tracked, strict=True):
+        if not ok:
+            rows.append(QualityRow(int(frame), False, "not tracked, so not measured"))
+            continue
+        reason = "; ".join(f"{name}: {why[f]}" for name, why in told.items() if why[f])
+        rows.append(QualityRow(int(frame), True, reason))
+        f += 1
+    return rows
+
+
 def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
     """The frames' coarse take, what regressors make of it, the oracle's meshes and layers, settings."""
     section = CorrectionConfig(
@@ -204,6 +230,9 @@ def main(snakemake):
     if true is not None:
         layer_errors = {n: held_out.layer_errors(of, take, true) for n, of in regressed.items()}
     sums = all_sums(result, sequences, take, tracker, fit.camera, contours, layer_errors)
+    surface = surfaces(sequences, take, tracker, fit.camera)
+    for name, of_lips in surface.items():
+        sums[name] += sums_of_surface(of_lips, result.clips)
     save_sums(out.sums, sums, len(frames))
     resampling = options.bootstrap_samples, options.confidence, options.seed
     table = measure_rows(sums, *place.values(), len(frames), *resampling)
@@ -220,8 +249,7 @@ def main(snakemake):
         correspondence.coarse_neutral_mm, regions.weights["mouth"] > 0, tracker, fit.camera,
     )  # fmt: skip
     write_arrays(out.maps, compressed=True, **maps)
-    reasons = ["" if ok else "not tracked, so not measured" for ok in tracked]
-    rows = [QualityRow(int(f), not why, why) for f, why in zip(asked, reasons, strict=True)]
+    rows = quality_rows(asked, tracked, surface)
     write_quality(out.quality, *place.values(), "evaluation", rows)
 
 

@@ -10,6 +10,7 @@ from vermilion.evaluation.measures import COLUMNS, seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
 from vermilion.report.feature_tables import estimators, table2, table3
 from vermilion.report.figures import plot_figure16, plot_table1
+from vermilion.report.headline import headline
 from vermilion.report.table1 import table1
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table, write_table
@@ -36,7 +37,9 @@ def main(snakemake):
     write_table(snakemake.output.table1, summary)
     configured = snakemake.params.cfg["training.regressor"]
     curves = [read_table(path) for path in snakemake.input.curves]
-    write_table(snakemake.output.comparisons, comparisons(takes, questions_of(configured), *pooled))
+    compared = comparisons(takes, questions_of(configured), *pooled)
+    write_table(snakemake.output.comparisons, compared)
+    write_table(snakemake.output.headline, headline(measures, compared))
     write_table(snakemake.output.table2, table2(curves))
     write_table(snakemake.output.table3, table3(summary))
     write_table(snakemake.output.estimators, estimators(curves, summary, configured))

@@ -35,7 +35,16 @@ def main(snakemake):
     def named(kind, paths):
         return [(name, Path(path)) for name, path in zip(names[kind], paths, strict=True)]
 
-    tables = ("measures", "table1", "kinds", "comparisons", "table2", "table3", "estimators")
+    tables = (
+        "measures",
+        "headline",
+        "table1",
+        "kinds",
+        "comparisons",
+        "table2",
+        "table3",
+        "estimators",
+    )
     found = SummaryInputs(
         **{name: read_table(inputs[name]) for name in tables},
         flagged=read_table(inputs.quality),
