@@ -31,7 +31,13 @@ class NullRegressor(LinearOutputs):
         persons: np.ndarray | None = None,
         n_layers: int | None = None,
     ) -> Self:
-        """Keep the number of features (F, M) and of targets (F, K); nothing else is used."""
+        """Keep the number of features and of targets; nothing else is used.
+
+        Args:
+            features: (F, M); targets: (F, K).
+            sequences, persons: (F,) labels, not used.
+            n_layers: not used.
+        """
         n_features, n_outputs = features.shape[1], targets.shape[1]
         self.n_features_in_ = n_features
         self.feature_mean_, self.feature_scale_ = np.zeros(n_features), np.ones(n_features)

@@ -119,7 +119,7 @@ class LipSurface:
         )
 
     def edge_roughness_mm(self, vertices_mm: np.ndarray, camera: Camera) -> float:
-        """Root mean square of what parabolas leave of the visible inner edges of a mesh (V, 3), mm."""
+        """Root mean square of what parabolas leave of the visible inner edges, mm, of `vertices_mm` (V, 3)."""
         heights = self.visible_edges_mm(vertices_mm, camera) @ self._ragged.T
         return float(np.sqrt(np.nanmean(heights**2))) if np.isfinite(heights).any() else 0.0
 
