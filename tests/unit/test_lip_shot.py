@@ -55,6 +55,7 @@ def test_without_a_model_nothing_is_learnt(clip, tmp_path):
     raw = yaml.safe_load(shot.configuration.read_text(encoding="utf-8"))
     configuration, _ = load_configuration(raw, "config.yaml")
     assert not configuration.apply.trains and configuration.apply.model is None
+    assert configuration.tracking.image_fit.appearance.frames == 10
 
 
 def test_a_configuration_that_somebody_changed_is_kept_beside(clip, tmp_path):

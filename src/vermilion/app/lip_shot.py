@@ -138,14 +138,12 @@ def _configuration(shot: LipShot, sheet: Path, chunk: int) -> str:
     apply = "regressor: none"
     if shot.model is not None:
         apply = f"model: {_scalar(shot.model)}"
-    scans = ""
+    person = ""
     if shot.scan is not None:
-        scans = f"""
-tracking:
+        person = f"""
   # The person's scan, from which their face model is made (docs/scan.md).
   scans:
-    {SUBJECT}: {{path: {_scalar(shot.scan)}}}
-"""
+    {SUBJECT}: {{path: {_scalar(shot.scan)}}}"""
     face = "\n".join(f"  {key}: {_scalar(value)}" for key, value in shot.face_model.items())
     return f"""\
 # Written by `vermilion lips`. Change what you like (docs/configuration.md has all keys), then go on with
@@ -162,7 +160,12 @@ face_model:
 landmarks:
   # 478 landmarks of a network that is trained on real faces.
   detector: mediapipe
-{scans}
+
+tracking:{person}
+  image_fit:
+    # One clip has one light: fewer frames than for a whole study tell it.
+    appearance: {{frames: 10, rounds: 3}}
+
 apply:
   # `regressor: none` lets the lips follow the contours in the image; `model: FILE.h5` names a trained
   # regressor, which corrects them before.

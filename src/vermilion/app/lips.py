@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Sequence
-from os import cpu_count
 from pathlib import Path
 
 from vermilion.app import place
-from vermilion.app.face_files import face_model
+from vermilion.app.face_files import cache_folder, face_model
 from vermilion.app.lip_shot import LipShot, write_shot
 from vermilion.app.run import run_all
 from vermilion.config.takes import read_takes
@@ -60,7 +60,7 @@ def correct_lips(
     section, sentences = face_model()
     shot = LipShot(source, "", section, given.get("model"), given.get("scan"), *span)
     results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
-    n_frames, chunk = write_shot(shot.into(results), cpu_count() or 1)
+    n_frames, chunk = write_shot(shot.into(results), os.cpu_count() or 1)
     for sentence in sentences:
         print(sentence, file=sys.stderr)
     print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
@@ -69,7 +69,7 @@ def correct_lips(
         raise InputError("; ".join(problems), "a take sheet", "Report this.")
     configuration = str(Path(results) / "config.yaml")
     code, skipped = run_all(
-        configuration, Path(results), takes, list(options), {}, expected(n_frames, chunk)
+        configuration, Path(results), takes, [*options, *_shared()], {}, expected(n_frames, chunk)
     )
     if skipped:
         return code or 1
@@ -77,6 +77,13 @@ def correct_lips(
     for page in pages if code == 0 else []:
         print(f"Look at: {page}")
     return code
+
+
+def _shared() -> list[str]:
+    """Options with which the built face model is kept in the cache and serves every clip."""
+    folder = Path(os.environ.setdefault("SNAKEMAKE_OUTPUT_CACHE", str(cache_folder() / "built")))
+    folder.mkdir(parents=True, exist_ok=True)
+    return ["--cache", "face_model"]
 
 
 def expected(n_frames: int, chunk: int) -> Callable[[str], float]:

@@ -11,8 +11,8 @@ import numpy as np
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import Hits, RayCaster, interpolate
+from vermilion.imaging.display import srgb8
 from vermilion.imaging.frames import FrameSource
-from vermilion.imaging.images import linear_to_srgb
 from vermilion.storage.errors import InputError
 
 _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
@@ -20,7 +20,7 @@ _SHIFT = 4  # sub-pixel bits of OpenCV's drawing
 
 def to_display(linear: np.ndarray) -> np.ndarray:
     """`linear` RGB (h, w, 3) as sRGB uint8."""
-    return np.rint(linear_to_srgb(linear) * 255).astype(np.uint8)
+    return srgb8(linear)
 
 
 def shown_frame(

@@ -14,10 +14,9 @@ import tempfile
 from pathlib import Path
 from typing import IO
 
-import numba
 import numpy as np
 
-from vermilion.imaging.images import linear_to_srgb
+from vermilion.imaging.display import srgb8
 from vermilion.landmarks import mediapipe_runner
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.sets import MEDIAPIPE478, LandmarkSet
@@ -25,8 +24,6 @@ from vermilion.storage.errors import InputError
 
 #: Faces that are looked for beside the one that counts.
 MAX_FACES = 4
-_STEPS = 65535
-_DISPLAY = np.rint(linear_to_srgb(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
 
 
 class MediapipeDetector:
@@ -57,7 +54,7 @@ class MediapipeDetector:
         Raises:
             InputError: the process of the network ended.
         """
-        pixels = _display(np.ascontiguousarray(linear_rgb, dtype=np.float32), _DISPLAY)
+        pixels = srgb8(linear_rgb)
         height, width = pixels.shape[:2]
         if self._process is None:
             self._start()
@@ -156,17 +153,3 @@ def environment_python(environment: str | Path) -> Path:
         "another kind.",
         path=folder,
     )
-
-
-@numba.njit(cache=True)
-def _display(linear, table):
-    """Linear RGB (h, w, 3) float32 as sRGB uint8; values beyond [0, 1] are cut off."""
-    result = np.empty(linear.shape, dtype=np.uint8)
-    for y in range(linear.shape[0]):
-        for x in range(linear.shape[1]):
-            for c in range(3):
-                value = linear[y, x, c]
-                value = value if value > 0 else np.float32(0)  # NaN gives zero
-                value = value if value < 1 else np.float32(1)
-                result[y, x, c] = table[np.int32(value * np.float32(_STEPS) + np.float32(0.5))]
-    return result
