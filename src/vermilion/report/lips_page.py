@@ -75,10 +75,12 @@ def take_page(found: TakePage) -> str:
 def _player(found: TakePage) -> str:
     encoded = base64.b64encode(found.video).decode("ascii")
     return (
-        f"{_STYLE}<figure class=shot><video id=shot controls loop muted playsinline "
+        f"{_STYLE}<figure class=shot><video id=shot loop muted playsinline "
         f'src="data:video/mp4;base64,{encoded}"></video>'
-        "<figcaption>Left the video, right the result; below, the mouth from near. Space plays and "
-        "stops, the arrow keys go frame by frame.</figcaption></figure>"
+        "<figcaption>Left the video, right the result; below, the mouth from near.</figcaption></figure>"
+        '<p class=bar><button id=play>Play</button><button id=back title="frame before">&lsaquo;</button>'
+        '<button id=next title="next frame">&rsaquo;</button><button id=slow>Quarter speed</button> '
+        "<span class=none>Space plays and stops, the arrow keys go frame by frame.</span></p>"
     )
 
 
@@ -155,6 +157,9 @@ def _going_on(found: TakePage) -> str:
 _STYLE = """<style>
 figure.shot { margin: 12px 0; } figure.shot video { width: 100%; max-height: 78vh; background: #161412;
   border-radius: 6px; display: block; }
+.bar button { font: inherit; font-size: 14px; padding: 5px 12px; margin: 0 6px 6px 0; cursor: pointer;
+  border: 1px solid var(--line); border-radius: 5px; background: #fff; color: var(--ink); }
+.bar button.on { border-color: var(--accent); color: var(--accent); } .bar .none { font-size: 13px; }
 .timeline { position: relative; } #line { width: 100%; display: block; cursor: crosshair;
   touch-action: pan-y; } #said { min-height: 1.5em; margin: 4px 0; font-size: 14px; }
 .legend { font-size: 13px; color: var(--soft); } .legend i { display: inline-block; width: 10px;
@@ -165,7 +170,7 @@ figure.shot { margin: 12px 0; } figure.shot video { width: 100%; max-height: 78v
 
 _SCRIPT = """
 const video = document.getElementById('shot'), canvas = document.getElementById('line');
-const said = document.getElementById('said'), left = 96, row = 20, curve = 56;
+const said = document.getElementById('said'), left = 108, row = 20, curve = 56;
 const at = () => Math.min(take.count - 1, Math.max(0, Math.floor(video.currentTime * take.fps + 0.01)));
 function draw() {
   const wide = canvas.clientWidth, high = take.rows.length * row + curve + 22, ratio = devicePixelRatio || 1;
@@ -181,8 +186,9 @@ function draw() {
     }
   });
   const top = take.rows.length * row + 6, most = Math.max(4, ...take.opening.filter(v => v !== null));
-  pen.fillStyle = '#6d6761'; pen.fillText('opening, mm', 0, top + 12);
-  pen.fillText(most.toFixed(0), left - 22, top + 10); pen.fillText('0', left - 14, top + curve);
+  pen.fillStyle = '#6d6761'; pen.fillText('opening', 0, top + 12);
+  pen.textAlign = 'right'; pen.fillText(most.toFixed(0) + ' mm', left - 6, top + 12);
+  pen.fillText('0', left - 6, top + curve); pen.textAlign = 'left';
   pen.strokeStyle = '#2a6f97'; pen.lineWidth = 1.4; pen.beginPath();
   let pause = true;
   take.opening.forEach((value, n) => {
@@ -207,10 +213,23 @@ canvas.addEventListener('pointerdown', event => {
 document.addEventListener('keydown', event => {
   if (event.target.matches('input, textarea, select')) return;
   if (event.key === 'ArrowRight' || event.key === 'ArrowLeft') {
-    video.pause(); go(at() + (event.key === 'ArrowRight' ? 1 : -1)); event.preventDefault();
-  } else if (event.key === ' ' && event.target !== video) {
-    video.paused ? video.play() : video.pause(); event.preventDefault();
+    step(event.key === 'ArrowRight' ? 1 : -1); event.preventDefault();
+  } else if (event.key === ' ' && !event.target.matches('button, a, summary')) {
+    toggle(); event.preventDefault();
   }
+});
+const play = document.getElementById('play'), slow = document.getElementById('slow');
+function toggle() { video.paused ? video.play() : video.pause(); }
+function step(by) { video.pause(); go(at() + by); }
+video.addEventListener('click', toggle); play.addEventListener('click', toggle);
+document.getElementById('back').addEventListener('click', () => step(-1));
+document.getElementById('next').addEventListener('click', () => step(1));
+slow.addEventListener('click', () => {
+  video.playbackRate = video.playbackRate === 1 ? 0.25 : 1;
+  slow.classList.toggle('on', video.playbackRate !== 1);
+});
+for (const name of ['play', 'pause']) video.addEventListener(name, () => {
+  play.textContent = video.paused ? 'Play' : 'Stop';
 });
 function follow() { draw(); if (!video.paused) requestAnimationFrame(follow); }
 for (const name of ['play', 'seeked', 'loadeddata', 'pause']) video.addEventListener(name, follow);
