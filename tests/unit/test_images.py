@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vermilion.imaging.display import srgb8
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import (
     image_size,
@@ -128,3 +129,13 @@ def test_same_images_give_the_same_video_whatever_lies_in_memory(tmp_path):
         written.add(path.read_bytes())
     assert len(written) == 1
     assert VideoReader(path).size == (1092, 688)
+
+
+def test_bytes_come_back_from_linear_light_and_what_is_beyond_is_cut_off():
+    bytes_ = np.arange(256, dtype=np.uint8)[None, :, None].repeat(3, axis=2)
+    np.testing.assert_array_equal(srgb8(srgb_to_linear(bytes_ / 255.0)), bytes_)
+    odd = np.array([[[np.nan, -1.0, 7.0]]])
+    np.testing.assert_array_equal(srgb8(odd), [[[0, 0, 255]]])
+    light = np.linspace(0, 1, 3000).reshape(10, 100, 3)
+    exact = np.rint(linear_to_srgb(light) * 255)
+    assert np.abs(srgb8(light) - exact).max() <= 1.0
