@@ -1,0 +1,38 @@
+"""Files by which others install, deploy and cite the project name what exists."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import yaml
+
+PROJECT = Path(__file__).parents[2]
+
+
+def test_the_citation_has_the_version_of_the_package():
+    citation = yaml.safe_load((PROJECT / "CITATION.cff").read_text(encoding="utf-8"))
+    package = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert citation["version"] == package["version"]
+    assert citation["license"] == package["license"]
+
+
+def test_the_container_copies_files_that_exist():
+    text = (PROJECT / "Containerfile").read_text(encoding="utf-8")
+    copies = re.findall(r"^COPY (?!--from)(.+) \S+$", text, re.M)
+    names = [name for line in copies for name in line.split()]
+    assert "requirements.lock" in names
+    for name in names:
+        assert (PROJECT / name).exists(), f"Containerfile copies {name}"
+
+
+def test_the_container_keeps_environments_and_results_out():
+    ignored = (PROJECT / ".containerignore").read_text(encoding="utf-8").split()
+    assert {".venv*", "results", ".git"} <= set(ignored)
+
+
+def test_every_page_of_the_site_is_in_its_navigation():
+    # `make docs` is strict, too, but needs its environment.
+    text = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
+    navigation = set(re.findall(r"[\w/]+\.md", text.split("\nnav:\n")[1]))
+    pages = {str(path.relative_to(PROJECT / "docs")) for path in (PROJECT / "docs").rglob("*.md")}
+    assert pages | {"changelog.md", "contributing.md"} == navigation
