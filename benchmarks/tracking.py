@@ -159,7 +159,7 @@ def speed(run: FinishedRun, model: FaceModel, person: Identity, fps: float, coun
     face = start.face(appearance.samples)
     photometric = FrameFitSettings(**options["image_fit"]["frame_fit"])
     pixel_mm, levels = options["image_fit"]["appearance"]["pixel_mm"], len(photometric.iterations)
-    problem = FrameProblem(face, appearance, photometric, settings.weight_sigma)
+    problem = FrameProblem(face, appearance, photometric, start.weight_sigmas)
     bending = OffsetSettings(**{k: v for k, v in options["offsets"].items() if k != "enabled"})
     layer = OffsetSolver(model, person.neutral_mm, face, appearance, bending)
 

@@ -2,6 +2,7 @@
 
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -64,12 +65,29 @@ def parameters(root, detector="trained", **csv):
     }
 
 
-def find(root, frames, params, **inputs):
+def find(root, frames, params, face=(), **inputs):
+    wildcards, camera = {"subject": "a", "take": "t"}, params | {"camera": "cam"}
+    faces, followed = root / "faces.npz", root / "followed.npz"
+    following = section()["following"] | {"least_eyes_px": 0.0}
+    run_script(
+        "landmarks/landmarks_faces",
+        wildcards=wildcards,
+        params=camera | {"frames": frames},
+        input=inputs,
+        output={"faces": faces},
+    )
+    run_script(
+        "landmarks/landmarks_followed",
+        wildcards=wildcards,
+        params={"cfg": {"landmarks.following": following}, "face": face, "one_shot": False},
+        input={"faces": [faces]},
+        output={"followed": followed, "table": root / "followed.tsv"},
+    )
     run_script(
         "landmarks/landmarks",
-        wildcards={"subject": "a", "take": "t"},
-        params=params | {"camera": "cam", "frames": frames},
-        input=inputs,
+        wildcards=wildcards,
+        params=camera,
+        input={"faces": faces, "followed": followed},
         output={
             "landmarks": root / "out.npz",
             "quality": root / "out.tsv",
@@ -96,6 +114,51 @@ def test_landmarks_do_not_depend_on_chunks(stage):
     whole, _ = find(root, [0, 1, 3], parameters(root))
     parts = [find(root, [frame], parameters(root))[0] for frame in (0, 1, 3)]
     assert np.array_equal(whole.points_px, np.concatenate([part.points_px for part in parts]))
+
+
+def two_people(root, rng, cut=None):
+    """A take of two drawn people side by side; from frame `cut` on, the same before another wall, moved."""
+    (mine, points), (other, _) = drawn_face(rng), drawn_face(rng)
+    smaller = cv2.resize(other, None, fx=0.7, fy=0.7, interpolation=cv2.INTER_AREA)
+    truth = []
+    for frame in range(8):
+        image = np.full((190, 400, 3), 0.35, dtype=np.float32)
+        left, top = 10 + frame, 20
+        if cut is not None and frame >= cut:
+            image[:] = [0.1, 0.25, 0.6]
+            image[:, ::37] = 0.9
+            left, top = 100, 35
+        image[60 : 60 + len(smaller), 255 : 255 + smaller.shape[1]] = smaller
+        if frame != 5:  # there only the other one is seen
+            image[top : top + len(mine), left : left + mine.shape[1]] = mine
+        write_image(root / "frames" / "cam" / f"{frame:06d}.png", image)
+        truth.append(points + np.array([left, top]))
+    return np.array(truth)
+
+
+def test_of_two_people_one_is_followed(stage, tmp_path):
+    root, _ = stage
+    truth = two_people(tmp_path / "two", np.random.default_rng(5))
+    params = parameters(root) | {"source": str(tmp_path / "two")}
+    track, quality = find(root, list(range(8)), params)
+    assert list(np.flatnonzero(~track.valid)) == [5]
+    good = track.valid
+    error = np.linalg.norm(track.points_px[good] - truth[good], axis=-1).mean(axis=1)
+    assert (error < 0.08 * face_size_px(truth[good])).all()
+    assert "1 other face(s) are not taken for it" in quality["reason"][5]
+    assert quality["reason"][0] == "2 faces: the largest is followed"
+    other, _ = find(root, list(range(8)), params, face=[320.0, 120.0])
+    assert (other.points_px[other.valid][..., 0].mean(axis=1) > 250).all() and other.valid.sum() > 6
+
+
+def test_a_cut_divides_the_landmarks(stage, tmp_path):
+    root, _ = stage
+    two_people(tmp_path / "cut", np.random.default_rng(5), cut=3)
+    params = parameters(root) | {"source": str(tmp_path / "cut")}
+    track, quality = find(root, list(range(8)), params)
+    assert list(track.pieces) == [0, 0, 0, 1, 1, 1, 1, 1]
+    assert "a cut: piece 2 begins" in quality["reason"][3]
+    assert LandmarkTrack.load([root / "out.npz"]).pieces[-1] == 1
 
 
 def test_landmarks_of_another_tracker_are_taken_from_its_file(stage):

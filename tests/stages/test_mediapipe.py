@@ -11,7 +11,7 @@ import pytest
 
 from vermilion.faces import procedural
 from vermilion.geometry.mesh import Mesh
-from vermilion.landmarks.detect import detect_frames
+from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.mediapipe import MediapipeDetector, environment_python
 from vermilion.landmarks.sets import MEDIAPIPE478
 from vermilion.scan.views import ScanViews, camera_towards
@@ -84,7 +84,7 @@ def test_landmarks_move_and_grow_with_the_image(detector, images, change):
 
 def test_a_frame_does_not_depend_on_those_before_it(detector, images):
     """Bit for bit, in whatever chunks a take is cut, and in another process."""
-    whole, _ = detect_frames(lambda f: detector.detect(images[f]), range(3), MEDIAPIPE478)
+    whole = LandmarkTrack.of(range(3), [detector.detect(images[f]) for f in range(3)])
     with MediapipeDetector(ENVIRONMENT) as other:
         single = other.detect(images[2])
     assert (whole.points_px[2] == single.points_px).all()

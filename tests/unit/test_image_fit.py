@@ -19,6 +19,9 @@ from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProble
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
 from vermilion.tracking.image_fit.smooth_over_time import smooth_over_time
 from vermilion.tracking.image_fit.take import learn_appearance
+from vermilion.tracking.landmark_fit.expression import N_POSE
+from vermilion.tracking.landmark_fit.smoothness import TemporalSmoothness
+from vermilion.tracking.landmark_fit.timeline import Timeline
 from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
 from vermilion.tracking.settings import LandmarkFitSettings
 
@@ -173,19 +176,22 @@ def test_joined_frames_keep_steady_motion_and_lose_noise():
     matrices = np.tile(np.eye(p) * 4.0, (n, 1, 1))
     everything = np.ones(n, dtype=bool)
     settings = LandmarkFitSettings()
-    same = smooth_over_time(matrices, 4.0 * steady, steady, everything, 30.0, settings)
+    timeline = Timeline.of(n, 30.0)
+    typical = settings.typical_acceleration(p - N_POSE)
+
+    def smoothed(x, known):
+        smoothness = TemporalSmoothness(typical, timeline, known, np.ones((n, p)))
+        return smooth_over_time(matrices, 4.0 * x, x, known, smoothness)
+
+    same = smoothed(steady, everything)
     assert np.abs(same - steady).max() < 1e-9
-    smooth = smooth_over_time(matrices, 4.0 * noisy, noisy, everything, 30.0, settings)
+    smooth = smoothed(noisy, everything)
     assert np.abs(smooth - steady)[:, 6:].mean() < 0.6 * np.abs(noisy - steady)[:, 6:].mean()
-    backwards = smooth_over_time(
-        matrices, 4.0 * noisy[::-1], noisy[::-1], everything, 30.0, settings
-    )
+    backwards = smoothed(noisy[::-1], everything)
     assert np.abs(backwards[::-1] - smooth).max() < 1e-6
     holes = everything.copy()
     holes[10] = False
-    assert np.allclose(
-        smooth_over_time(matrices, 4.0 * noisy, noisy, holes, 30.0, settings)[10], noisy[10]
-    )
+    assert np.allclose(smoothed(noisy, holes)[10], noisy[10])
 
 
 def test_chosen_frames_are_well_fitted_and_differ():

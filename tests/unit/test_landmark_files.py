@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from tests.unit.synthetic_face import landmark_layout
-from vermilion.landmarks.detect import detect_frames
+from vermilion.landmarks.detect import followed_track
 from vermilion.landmarks.detector import Landmarks, LandmarkTrack
+from vermilion.landmarks.faces import SeenFaces, find_faces
+from vermilion.landmarks.following import FaceChoice, follow
 from vermilion.landmarks.labels import label_files, read_label, read_labels
 from vermilion.landmarks.scheme import FROM_68, LIP_INNER, LIP_OUTER, MIRROR, interocular_px
 from vermilion.landmarks.table import read_landmark_csv
@@ -68,13 +70,19 @@ def test_views_without_a_face_are_left_out(tmp_path):
     assert LandmarkViews.of({"lip0": Landmarks.none()}).points_px.shape == (0, 66, 2)
 
 
-def test_an_unreadable_frame_is_flagged_and_the_rest_goes_on():
-    def find(frame):
+def test_an_unreadable_frame_is_flagged_and_the_rest_goes_on(tmp_path):
+    def read(frame):
         if frame == 1:
             raise InputError("a truncated image", "a whole one", "Export it.", frame=1)
-        return Landmarks.none() if frame == 2 else found()
+        return np.full((90, 160, 3), 0.5, dtype=np.float32)
 
-    track, rows = detect_frames(find, [0, 1, 2, 3])
+    def find(frame, image):
+        return [] if image is None or frame == 2 else [found()]
+
+    finds = find_faces(read, find, [0, 1, 2, 3])
+    finds.save(tmp_path / "000000-000003.npz")
+    seen = SeenFaces.load([tmp_path / "000000-000003.npz"])
+    track, rows = followed_track(finds, follow(seen, FaceChoice(least_eyes_px=0.0)))
     assert list(track.valid) == [True, False, False, True]
     assert "truncated" in rows[1].reason and rows[2].reason == "no face found"
     assert rows[3].figures["confidence"] == pytest.approx(0.9)

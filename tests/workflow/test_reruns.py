@@ -21,7 +21,8 @@ AFTER_TRACKING = AFTER_CONTOURS | {
     "appearance", "image_fit", "image_fit_join", "residuals", "ablations", "tracking_meshes", "correspondence", "layers", "lip_shapes", "evaluate_reconstruction",
 }  # fmt: skip
 AFTER_INPAINT = AFTER_TRACKING | {
-    "landmarks", "image_identity", "tracking", "tracking_topology", "contour_detector", "contours",
+    "landmarks_faces", "landmarks_followed", "landmarks", "image_identity", "tracking",
+    "tracking_topology", "contour_detector", "contours",
 }  # fmt: skip
 AFTER_MULTIVIEW = AFTER_INPAINT | {"inpaint_reference", "inpaint"}
 AFTER_CAMERAS = AFTER_MULTIVIEW | {
@@ -92,7 +93,19 @@ def test_landmarks_corrected_by_flow(finished):
 
     with configured(finished, change):
         jobs = finished.would_run()
-    assert set(jobs) == AFTER_INPAINT | {"landmarks_key_frames", "landmarks_corrected"}
+    kept = {"landmarks_faces", "landmarks_followed"}
+    corrected = {"landmarks_key_frames", "landmarks_corrected"}
+    assert set(jobs) == (AFTER_INPAINT - kept) | corrected
+
+
+def test_which_face_is_followed(finished):
+    def change(content):
+        content["landmarks"]["following"] = {"face": [10.0, 10.0]}
+
+    with configured(finished, change):
+        jobs = set(finished.would_run())
+    assert {"landmarks_followed", "landmarks", "tracking"} <= jobs
+    assert not jobs & {"landmarks_faces", "inpaint"}  # faces are not looked for again
 
 
 def test_contour_label(finished):

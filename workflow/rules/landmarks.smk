@@ -136,12 +136,66 @@ def key_frame_csv(wildcards):
     return [path] if path and Path(path).is_file() else []
 
 
-rule landmarks:
-    """Finds the landmarks of a chunk of the monocular images, each by itself."""
+rule landmarks_faces:
+    """Finds all faces in a chunk of the monocular images, each by itself: landmarks/faces/{chunk}.npz."""
     input:
         images=chunk_images,
         detector=detector_files,
         csv=landmark_csv_input,
+    output:
+        faces=P.faces,
+    log:
+        P.log("landmarks_faces", "chunk"),
+    benchmark:
+        P.benchmark("landmarks_faces", "chunk")
+    resources:
+        mem_mb=1000,
+        runtime=60,
+    params:
+        cfg=detector_cfg("landmarks.csv"),
+        code=code_of("landmarks/landmarks_faces"),
+        source=chunk_source,
+        camera=mono_camera,
+        frames=chunk_frames,
+        model=detector_path,
+    script:
+        "../scripts/landmarks/landmarks_faces.py"
+
+
+def followed_face(wildcards):
+    """Which face of a take is followed: what the take sheet says, else the configuration."""
+    return list(take_of(wildcards).face) or CONFIG.landmarks.following.face
+
+
+rule landmarks_followed:
+    """Finds the cuts of a take, chooses one face and follows it: landmarks/followed.npz and .tsv."""
+    input:
+        faces=per_chunk(P.faces),
+    output:
+        followed=P.followed,
+        table=P.followed_table,
+    log:
+        P.log("landmarks_followed", "take"),
+    benchmark:
+        P.benchmark("landmarks_followed", "take")
+    resources:
+        mem_mb=lambda wildcards: 500 + len(take_of(wildcards).frames) // 20,
+        runtime=10,
+    params:
+        cfg=cfg_of("landmarks.following"),
+        code=code_of("landmarks/landmarks_followed"),
+        face=followed_face,
+        one_shot=lambda wildcards: take_of(wildcards).is_multiview,
+    script:
+        "../scripts/landmarks/landmarks_followed.py"
+
+
+rule landmarks:
+    """Writes the landmarks of the followed face in a chunk, with quality rows and an overlay."""
+    input:
+        images=chunk_images,
+        faces=P.faces,
+        followed=P.followed,
     output:
         landmarks=DETECTED + "/{chunk}.npz",
         quality=DETECTED + "/quality/{chunk}.tsv",
@@ -152,14 +206,11 @@ rule landmarks:
         P.benchmark("landmarks", "chunk")
     resources:
         mem_mb=1000,
-        runtime=60,
+        runtime=30,
     params:
-        cfg=detector_cfg("landmarks.csv"),
         code=code_of("landmarks/landmarks"),
         source=chunk_source,
         camera=mono_camera,
-        frames=chunk_frames,
-        model=detector_path,
     script:
         "../scripts/landmarks/landmarks.py"
 

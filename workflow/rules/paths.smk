@@ -48,6 +48,9 @@ class P:
     # landmarks
     landmark_models = R + "/landmarks/"
     landmark_model = R + "/landmarks/model.npz"
+    faces = _TAKE + "/landmarks/faces/{chunk}.npz"
+    followed = _TAKE + "/landmarks/followed.npz"
+    followed_table = _TAKE + "/landmarks/followed.tsv"
     landmarks = _TAKE + "/landmarks/{chunk}.npz"
     landmarks_folder = _TAKE + "/landmarks"
     key_frames = _TAKE + "/landmarks/key_frames.npz"

@@ -126,6 +126,7 @@ rule tracking:
         identity=P.identity,
         landmarks=per_chunk(P.landmarks),
         cameras=P.cameras,
+        video=facts_of_video,
     output:
         fit=landmark_fit(),
     log:
@@ -240,6 +241,7 @@ if CONFIG.tracking.image_fit.enabled:
             fit=landmark_fit(),
             chunks=per_chunk(P.image_fit),
             landmarks=per_chunk(P.landmarks),
+            video=facts_of_video,
         output:
             fit=P.fit,
         log:

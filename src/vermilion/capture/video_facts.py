@@ -100,6 +100,18 @@ def load_video_facts(path: str | Path) -> VideoFacts:
         ) from error
 
 
+def uneven_times(path: str | Path | None, frames: np.ndarray) -> np.ndarray | None:
+    """Times (F,) in seconds of `frames` (F,) of a video whose rate varies.
+
+    None where there are no facts of a video at `path`, or its frames are evenly spaced: then the take sheet's
+    rate holds.
+    """
+    if not path:
+        return None
+    times = load_video_facts(path).times_s
+    return None if _is_even(times) else times[np.asarray(frames, dtype=np.int64)]
+
+
 def rate_warning(facts: VideoFacts, sheet_fps: float) -> str:
     """What differs between the file's rate and the take sheet's; empty where nothing does."""
     steps, sheet = np.diff(facts.times_s), f"the take sheet says {sheet_fps:g}"
@@ -108,8 +120,9 @@ def rate_warning(facts: VideoFacts, sheet_fps: float) -> str:
     if not _is_even(facts.times_s):
         return (
             f"frames are {steps.min():.3f} to {steps.max():.3f} s apart ({facts.fps:.4g} a second on "
-            f"average), {sheet} frames a second, evenly: convert with `ffmpeg -i {facts.file} -vf "
-            f"fps={sheet_fps:g} -crf 12 even.mp4` where motion over time matters"
+            f"average), {sheet}: the track is smoothed over these times, but exports and overlays show the "
+            f"frames at the sheet's rate; convert with `ffmpeg -i {facts.file} -vf fps={sheet_fps:g} -crf 12 "
+            "even.mp4` where their timing matters"
         )
     if abs(facts.fps - sheet_fps) > _SAME_RATE * sheet_fps:
         return f"the file has {facts.fps:.4g} frames a second, {sheet}: correct `fps`"

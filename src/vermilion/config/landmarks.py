@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from vermilion.config.base import StageConfig, section
+from vermilion.config.takes import face_problem
 
 
 class NetworksConfig(StageConfig):
@@ -153,6 +154,39 @@ class LandmarkCorrectionConfig(StageConfig):
     )
 
 
+class FollowingConfig(StageConfig):
+    """Which face is followed, and what is too little of one."""
+
+    face: list[float] = Field(
+        default_factory=list,
+        max_length=4,
+        description="Which of several faces is followed, for takes whose row of the take sheet has nothing "
+        "in its column `face`. Empty: the largest; x, y: the one nearest to a point; left, top, right, "
+        "bottom: the largest with its middle in a box (pixels of the upright image).",
+    )
+    least_eyes_px: float = Field(
+        16.0,
+        ge=0,
+        le=1000,
+        description="Faces whose outer eye corners are nearer to each other, at the sharpness of the image, "
+        "count as not found (pixels).",
+    )
+    person_difference: float = Field(
+        0.028,
+        gt=0,
+        le=10,
+        description="After a cut, a face whose shape differs by more is another person's, and its frames "
+        "count as not found; only `mediapipe` tells (inter-ocular distances).",
+    )
+
+    @field_validator("face")
+    @classmethod
+    def _none_a_point_or_a_box(cls, value: list[float]) -> list[float]:
+        if reason := face_problem(value):
+            raise ValueError(reason)
+        return value
+
+
 class LandmarksConfig(StageConfig):
     """Landmarks of every frame (Mono13 5)."""
 
@@ -173,6 +207,7 @@ class LandmarksConfig(StageConfig):
         default_factory=list,
         description="`trained`, or in place of `mediapipe`: takes (subject/take) whose captures hold labels/landmarks/.",
     )
+    following: FollowingConfig = section(FollowingConfig, "The face that is followed.")
     networks: NetworksConfig = section(NetworksConfig, "The ONNX networks.")
     csv: LandmarkFilesConfig = section(LandmarkFilesConfig, "Files of another tracker.")
     training: LandmarkTrainingConfig = section(LandmarkTrainingConfig, "The embedded regressor.")

@@ -50,6 +50,11 @@ def take_sheet_schema() -> dict[str, Any]:
             "pattern": f"^({SPLIT})$",
             "description": "train, test, none, or test:A-B,C-D (these stretches are held out).",
         },
+        "face": {
+            "type": "string",
+            "description": "Which of several faces is followed: nothing (the largest), `x,y` (the nearest) "
+            "or `left,top,right,bottom` (the largest in a box), pixels. The column may be left out.",
+        },
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, cast, get_args
@@ -13,6 +15,8 @@ from vermilion.storage.errors import InputError
 
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
+#: Columns that may be left out.
+OPTIONAL_COLUMNS = ("face",)
 #: What a split may be.
 SPLIT = r"train|test|none|test:\d+-\d+(,\d+-\d+)*"
 #: `source` of a take that the studio makes.
@@ -32,6 +36,7 @@ class Take:
         fps: frames a second.
         split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
             rest trains).
+        face: which of several faces is followed: none, (x, y) or (left, top, right, bottom), pixels.
     """
 
     subject: str
@@ -42,6 +47,7 @@ class Take:
     last: int
     fps: float
     split: str
+    face: tuple[float, ...] = ()
 
     @property
     def name(self) -> str:
@@ -91,7 +97,7 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
     rows = list(csv.DictReader(lines, delimiter="\t"))
     header = lines[0].split("\t") if lines else []
     missing = [name for name in COLUMNS if name not in header]
-    unknown = [name for name in header if name not in COLUMNS]
+    unknown = [name for name in header if name not in COLUMNS + OPTIONAL_COLUMNS]
     if missing or unknown:
         return [], [
             f"{path}, header: found columns {header}; expected {list(COLUMNS)}, separated "
@@ -108,7 +114,7 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
 
 
 def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
-    value = {name: (row[name] or "").strip() for name in COLUMNS}
+    value = {name: (row.get(name) or "").strip() for name in COLUMNS + OPTIONAL_COLUMNS}
     wrong = []
     for name in ("subject", "take"):
         if not re.fullmatch(r"[A-Za-z0-9_.]+", value[name]):
@@ -154,6 +160,8 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
                     f"split: found held-out frames {low} to {high}; expected them within "
                     f"{numbers['first']} to {numbers['last']}."
                 )
+    face, reason = _face(value["face"])
+    wrong += [reason] if reason else []
     if wrong:
         return None, wrong
     take = Take(
@@ -165,8 +173,30 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         int(numbers["last"]),
         numbers["fps"],
         split,
+        face,
     )
     return take, []
+
+
+def _face(text: str) -> tuple[tuple[float, ...], str]:
+    """The numbers of the column `face`, and a sentence where they are none."""
+    try:
+        numbers = [float(part) for part in text.split(",")] if text else []
+    except ValueError:
+        return (), f"face: found '{text}'; expected numbers separated by commas, or nothing."
+    return tuple(numbers), face_problem(numbers)
+
+
+def face_problem(numbers: Sequence[float]) -> str:
+    """What is wrong with the numbers that say which face is followed; empty where nothing is."""
+    if len(numbers) not in (0, 2, 4) or not all(math.isfinite(number) for number in numbers):
+        return (
+            f"face: found {len(numbers)} numbers; expected nothing (the largest), x, y (the nearest to "
+            "a point) or left, top, right, bottom (the largest in a box), in pixels."
+        )
+    if len(numbers) == 4 and not (numbers[0] < numbers[2] and numbers[1] < numbers[3]):
+        return "face: found an empty box; expected left < right and top < bottom."
+    return ""
 
 
 def _with_range(

@@ -55,6 +55,12 @@ class ModelFitConfig(StageConfig):
     weight_sigma: float = Field(
         0.5, gt=0.01, le=100, description="Deviation of a blend weight about zero."
     )
+    lid_weight_sigma: float = Field(
+        1.0,
+        gt=0.01,
+        le=100,
+        description="Deviation of the closing lids' weights about zero, where larger: blinks are whole.",
+    )
     jaw_slide: float = Field(
         0.1,
         ge=0,
@@ -126,7 +132,14 @@ class MotionConfig(StageConfig):
 
     rotation_acceleration_deg: float = acceleration(400.0, "a head's rotation", "degrees")
     translation_acceleration_mm: float = acceleration(600.0, "a head", "mm")
-    weight_acceleration: float = acceleration(60.0, "a blend weight", "1")
+    weight_acceleration: float = acceleration(40.0, "a blend weight", "1")
+    fast_limit: float = Field(
+        3.5,
+        gt=0,
+        le=1000,
+        description="Lids or mouth that accelerate this many times as much as noise does in the single "
+        "frames are half free of smoothing: blinks and closing lips stay whole. Large: all is smoothed.",
+    )
     iterations: int = Field(15, ge=1, le=200, description="Gauss-Newton steps, at most (count).")
     max_reprojection: float = Field(
         0.12,

@@ -15,8 +15,10 @@ from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.sequences import frames_of
 from vermilion.tracking.result import TrackedTake
 
+#: Frames that a cut counts for, more than anything over time reaches.
+_ROOM = 1_000_000
 _PER_FRAME = (
-    "frames", "coarse_mm", "rotation", "translation_mm", "features", "valid", "image",
+    "frames", "coarse_mm", "rotation", "translation_mm", "features", "valid", "image", "piece",
 )  # fmt: skip
 
 
@@ -34,6 +36,7 @@ class CoarseTake:
         features: (F, M) of the regressor; NaN where a frame has none.
         valid: (F,) bool, frames that were tracked.
         image: contours in the images of the same frames; None where there are none.
+        piece: (F,) int piece between cuts of each frame; None: all in one.
     """
 
     frames: np.ndarray
@@ -45,6 +48,7 @@ class CoarseTake:
     features: np.ndarray
     valid: np.ndarray
     image: ImageContours | None = None
+    piece: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -77,6 +81,7 @@ class CoarseTake:
             features=np.where(measured["valid"][:, None], measured["features"], np.nan),
             valid=fit.valid[rows],
             image=ImageContours.of(face, fit.camera, measured),
+            piece=fit.pieces[rows],
         )
 
     @classmethod
@@ -104,6 +109,11 @@ class CoarseTake:
 
     def __len__(self) -> int:
         return len(self.frames)
+
+    @property
+    def frames_apart(self) -> np.ndarray:
+        """(F,) frame numbers with room at every cut, so that nothing over time reaches across."""
+        return self.frames if self.piece is None else self.frames + self.piece * _ROOM
 
     def __getitem__(self, rows: np.ndarray | slice) -> CoarseTake:
         """The same of some frames, by rows or (F,) bool."""

@@ -134,7 +134,7 @@ class Corrector:
         """Corrected meshes (F, V, 3) float64, world, mm, of a take of the same person."""
         rows = take.usable(take.features)
         usable = take[rows]
-        head_mm = self.correct_heads(_in_head(usable), usable.features, usable.frames)
+        head_mm = self.correct_heads(_in_head(usable), usable.features, usable.frames_apart)
         return _in_world(take, rows, head_mm, self._agreement)
 
     def correct_heads(

@@ -150,7 +150,7 @@ class ImageAgreement:
             lines, pivot, unit_px, camera,
         )  # fmt: skip
         known = lines[2].mean(axis=1) >= _LEAST_KNOWN
-        motion = smoothed_motion(motion, known, take.frames, self.settings.repose_frames)
+        motion = smoothed_motion(motion, known, take.frames_apart, self.settings.repose_frames)
         origin = apply_motion(take.translation_mm[:, None], pivot, motion)[:, 0]
         return rotation_matrix(motion[:, :3]) @ take.rotation, origin
 

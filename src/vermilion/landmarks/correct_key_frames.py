@@ -54,14 +54,17 @@ def settle(
     shapes = rough_shapes(track, keys)
     points = np.full((len(wanted), N_LANDMARKS, 2), np.nan)
     confidence = np.zeros(points.shape[:2])
-    clip_of = np.searchsorted(ends, wanted)
-    for clip in np.unique(clip_of):
-        at = clip_of == clip
+    clip_of, pieces = np.searchsorted(ends, wanted), track.pieces
+    for clip, number in sorted(set(zip(clip_of.tolist(), pieces[wanted].tolist(), strict=True))):
+        at = (clip_of == clip) & (pieces[wanted] == number)
         rows, spans = wanted[at], []
-        if clip > 0:
+        # Flow does not lead across a cut.
+        if clip > 0 and pieces[ends[clip - 1]] == number:
             spans.append(range(ends[clip - 1], rows[-1] + 1))
-        if clip < len(ends):
+        if clip < len(ends) and pieces[ends[clip]] == number:
             spans.append(range(ends[clip], rows[0] - 1, -1))
+        if not spans:
+            continue
         ways = [
             _carried(read_grey, track, span, trusted[span.start], rows, shapes, settings)
             for span in spans

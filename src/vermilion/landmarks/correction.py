@@ -122,18 +122,41 @@ def flow_points(
     key_rows = np.searchsorted(track.frames, keys.frames)
     points[key_rows], confidence[key_rows] = keys.points_px, 1.0
     shapes = rough_shapes(track, keys)
-    ends = np.concatenate([[-1], key_rows, [len(track.frames)]])
-    for clip in range(len(ends) - 1):
-        inside = np.arange(ends[clip] + 1, ends[clip + 1])
-        if not len(keys.frames) or not np.isin(inside, rows).any():
+    trusted = dict(zip(key_rows.tolist(), keys.points_px, strict=True))
+    for first, last in _clips(key_rows, track.pieces):
+        inside = np.arange(first, last + 1)
+        before, after = trusted.get(first - 1), trusted.get(last + 1)
+        # Flow does not lead across a cut.
+        before = before if first and track.pieces[first - 1] == track.pieces[first] else None
+        after = (
+            after if after is not None and track.pieces[last + 1] == track.pieces[last] else None
+        )
+        if (before is None and after is None) or not np.isin(inside, rows).any():
             continue
-        before = keys.points_px[clip - 1] if clip > 0 else None
-        after = keys.points_px[clip] if clip < len(key_rows) else None
-        span = np.arange(max(ends[clip], 0), min(ends[clip + 1] + 1, len(track.frames)))
+        span = np.arange(first - (before is not None), last + 1 + (after is not None))
         found = _clip_points(read_grey, track.frames, span, shapes, (before, after), settings)
         keep = np.isin(span, inside)
         points[span[keep]], confidence[span[keep]] = found[0][keep], found[1][keep]
     return FlowPoints(points[rows], confidence[rows])
+
+
+def _clips(key_rows: np.ndarray, piece: np.ndarray) -> list[tuple[int, int]]:
+    """First and last row of the runs of frames without a key frame or a cut between them.
+
+    Args:
+        key_rows: (K,) rows of the key frames.
+        piece: (F,) int piece of each frame.
+    """
+    clips: list[tuple[int, int]] = []
+    begin = None
+    is_key = np.isin(np.arange(len(piece)), key_rows)
+    for row in range(len(piece)):
+        if begin is not None and (is_key[row] or piece[row] != piece[row - 1]):
+            clips.append((begin, row - 1))
+            begin = None
+        if begin is None and not is_key[row]:
+            begin = row
+    return clips if begin is None else [*clips, (begin, len(piece) - 1)]
 
 
 def _clip_points(read_grey, frames, span, shapes, ends, settings):
@@ -219,13 +242,23 @@ def blend(
         np.where(good[:, None, None], points, np.nan),
         np.where(good[:, None], confidence, 0.0),
         good,
+        piece=None if track.piece is None else track.pieces[rows],
     )
 
 
 def rough_shapes(track: LandmarkTrack, keys: KeyFrames) -> np.ndarray:
-    """About where the face is in every frame (F, 66, 2): between found faces, interpolated."""
+    """About where the face is in every frame (F, 66, 2): between found faces of its piece, interpolated."""
     points = track.points_px.copy()
     points[np.searchsorted(track.frames, keys.frames)] = keys.points_px
+    shapes = points.copy()
+    for number in np.unique(track.pieces):
+        own = np.flatnonzero(track.pieces == number)
+        shapes[own] = _interpolated(points[own])
+    return shapes
+
+
+def _interpolated(points: np.ndarray) -> np.ndarray:
+    """Points (F, 66, 2) with those that are not known, NaN, between those that are; none known: as they are."""
     known = np.flatnonzero(np.isfinite(points).all(axis=(1, 2)))
     if not len(known):
         return points

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.detector import MAX_FACES, Landmarks, apart, most_prominent
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
 from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
@@ -109,15 +109,21 @@ class DescentDetector:
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
         """Landmarks of the surest face in `linear_rgb` (h, w, 3)."""
+        return most_prominent(self.faces(linear_rgb), self.landmark_set)
+
+    def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
+        """Faces in `linear_rgb` (h, w, 3), the surest first; the others only where they are sure."""
         grey = grey_of(linear_rgb)
-        best = Landmarks.none()
-        for centre, size, _ in self.locator.locate(grey):
-            found = self.refine(grey, self.mean * size + centre)
-            if found.confidence.mean() > best.confidence.mean():
-                best = found
-            if best.confidence.mean() > 0.5 * (1 + self.found_threshold):
-                break
-        return best if best.confidence.mean() >= self.found_threshold else Landmarks.none()
+        sure = 0.5 * (1 + self.found_threshold)
+        found: list[Landmarks] = []
+        for centre, size, _ in self.locator.locate(grey, MAX_FACES):
+            if any(_covers(face, centre) for face in found if face.confidence.mean() > sure):
+                continue
+            found.append(self.refine(grey, self.mean * size + centre))
+        found = sorted((f for f in found if f.found), key=lambda face: -face.confidence.mean())
+        good = [f for f in found[:1] if f.confidence.mean() >= self.found_threshold]
+        good += [f for f in found[1:] if f.confidence.mean() > sure]
+        return apart(good, MAX_FACES)
 
     def refine(self, grey: np.ndarray, shape: np.ndarray) -> Landmarks:
         """All stages on `grey` (h, w) from a starting `shape` (66, 2) px, and how sure each point is."""
@@ -162,3 +168,9 @@ class DescentDetector:
             FaceLocator(arrays["locator_weights"], float(arrays["locator_bias"])),
             float(arrays["found_threshold"]),
         )
+
+
+def _covers(face: Landmarks, point: np.ndarray) -> bool:
+    """Whether a point (2,) px lies in the box of a face's landmarks."""
+    low, high = face.points_px.min(axis=0), face.points_px.max(axis=0)
+    return bool(((low <= point) & (point <= high)).all())

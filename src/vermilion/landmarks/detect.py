@@ -1,46 +1,43 @@
-"""Landmarks of the frames of a take, each flagged where no face was found or no image read."""
+"""Landmarks of the followed face in the frames of a take, each flagged where it is not there."""
 
 from __future__ import annotations
-
-from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from vermilion.imaging.draw import draw_points, draw_polyline, label, shown_frame, tile
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import Landmarks, LandmarkTrack
-from vermilion.landmarks.sets import IBUG66, LandmarkSet
-from vermilion.storage.errors import InputError
+from vermilion.landmarks.faces import FaceFinds
+from vermilion.landmarks.following import NOT_FOUND, FollowedFace
+from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
-NOT_FOUND = "no face found"
 
-
-def detect_frames(
-    find: Callable[[int], Landmarks],
-    frames: Sequence[int],
-    landmark_set: LandmarkSet = IBUG66,
+def followed_track(
+    finds: FaceFinds, followed: FollowedFace
 ) -> tuple[LandmarkTrack, list[QualityRow]]:
-    """Landmarks of some frames, and a quality row each.
+    """Landmarks of the followed face in a chunk's frames, and a quality row each.
 
     Args:
-        find: landmarks of a frame; may raise InputError, which flags the frame.
-        frames: frame numbers.
-        landmark_set: the set that `find` gives.
+        finds: all faces of these frames.
+        followed: the face of every frame of the take.
     """
-    entries, rows = [], []
-    for frame in progress(frames, "landmarks"):
-        reason = NOT_FOUND
-        try:
-            entry = find(frame)
-        except InputError as error:
-            entry, reason = Landmarks.none(landmark_set), str(error)
-        confidence = {"confidence": round(float(entry.confidence.mean()), 4)}
-        rows.append(QualityRow(frame, entry.found, "" if entry.found else reason, confidence))
-        entries.append(entry)
-    return LandmarkTrack.of(frames, entries), rows
+    rows = np.searchsorted(followed.frames, finds.frames)
+    entries, quality = [], []
+    for faces, row in zip(finds.faces, rows, strict=True):
+        valid = bool(followed.valid[row])
+        face = faces[followed.face[row]] if valid else Landmarks.none(finds.landmark_set)
+        figures = {
+            "confidence": round(float(face.confidence.mean()), 4),
+            "eyes_px": round(float(followed.eyes_px[row]), 1),
+            "faces": float(followed.n_faces[row]),
+            "piece": float(followed.piece[row] + 1),
+        }
+        reason = str(followed.reason[row])
+        quality.append(QualityRow(int(followed.frames[row]), valid, reason, figures))
+        entries.append(face)
+    return LandmarkTrack.of(finds.frames.tolist(), entries, followed.piece[rows]), quality
 
 
 def landmark_overlay(source: FrameSource, camera: str, track: LandmarkTrack) -> np.ndarray:

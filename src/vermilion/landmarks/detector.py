@@ -44,8 +44,36 @@ class Landmarks:
         return Landmarks(self.points_px[ids], self.confidence[ids], self.found)
 
 
+#: Faces that are looked for in an image.
+MAX_FACES = 4
+#: Two faces that overlap by more (intersection over the smaller) are one.
+SAME_FACE = 0.5
+
+
+def most_prominent(faces: Sequence[Landmarks], landmark_set: LandmarkSet) -> Landmarks:
+    """The first of some faces; none of a set where there is none."""
+    return faces[0] if len(faces) else Landmarks.none(landmark_set)
+
+
+def apart(faces: Sequence[Landmarks], count: int) -> list[Landmarks]:
+    """At most `count` of some faces, in their order, without those that another before them covers."""
+    kept: list[Landmarks] = []
+    for face in faces:
+        if len(kept) < count and not any(overlap(face, other) > SAME_FACE for other in kept):
+            kept.append(face)
+    return kept
+
+
+def overlap(a: Landmarks, b: Landmarks) -> float:
+    """Intersection of two faces' boxes over the smaller of them."""
+    low = np.maximum(a.points_px.min(axis=0), b.points_px.min(axis=0))
+    high = np.minimum(a.points_px.max(axis=0), b.points_px.max(axis=0))
+    least = min(np.prod(np.ptp(face.points_px, axis=0)) for face in (a, b))
+    return float(np.prod(np.maximum(high - low, 0.0)) / max(least, 1e-9))
+
+
 class LandmarkDetector(Protocol):
-    """Finds the landmarks of the most prominent face, each image by itself.
+    """Finds the landmarks of faces, each image by itself.
 
     Attributes:
         landmark_set: the set that it gives.
@@ -53,8 +81,11 @@ class LandmarkDetector(Protocol):
 
     landmark_set: LandmarkSet
 
+    def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
+        """Up to `MAX_FACES` faces of an image `linear_rgb` (h, w, 3) float32, most prominent first."""
+
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
-        """Landmarks of an image `linear_rgb` (h, w, 3) float32."""
+        """Landmarks of the most prominent face of an image `linear_rgb` (h, w, 3) float32."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +99,7 @@ class LandmarkTrack:
         valid: (F,) bool.
         landmark_set: what the N points are.
         depth_px: (F, N) away from the camera, NaN where not valid; None where the detector has none.
+        piece: (F,) int piece between cuts of each frame, counted from 0; None: all in one.
     """
 
     frames: np.ndarray
@@ -76,10 +108,13 @@ class LandmarkTrack:
     valid: np.ndarray
     landmark_set: LandmarkSet = IBUG66
     depth_px: np.ndarray | None = None
+    piece: np.ndarray | None = None
 
     @classmethod
-    def of(cls, frames: Sequence[int], found: Sequence[Landmarks]) -> LandmarkTrack:
-        """One entry a frame, all of one set."""
+    def of(
+        cls, frames: Sequence[int], found: Sequence[Landmarks], piece: np.ndarray | None = None
+    ) -> LandmarkTrack:
+        """One entry a frame, all of one set; `piece` (F,) as in the attributes."""
         depth = None
         if any(entry.depth_px is not None for entry in found):
             unknown = np.full(len(found[0].points_px), np.nan)
@@ -91,7 +126,14 @@ class LandmarkTrack:
             np.array([entry.found for entry in found], dtype=bool),
             found[0].landmark_set if len(found) else IBUG66,
             depth,
+            piece,
         )
+
+    @property
+    def pieces(self) -> np.ndarray:
+        """(F,) int piece between cuts of each frame: what follows time stops where it changes."""
+        none = np.zeros(len(self.frames), dtype=np.int64)
+        return none if self.piece is None else np.asarray(self.piece)
 
     def as_ibug66(self) -> LandmarkTrack:
         """The 66 points of `ibug66` alone."""
@@ -99,7 +141,11 @@ class LandmarkTrack:
             return self
         ids = self.landmark_set.ibug66
         return LandmarkTrack(
-            self.frames, self.points_px[:, ids], self.confidence[:, ids], self.valid
+            self.frames,
+            self.points_px[:, ids],
+            self.confidence[:, ids],
+            self.valid,
+            piece=self.piece,
         )
 
     def save(self, path: str | Path) -> None:
@@ -109,6 +155,8 @@ class LandmarkTrack:
             arrays["landmark_set"] = np.array(self.landmark_set.name)
         if self.depth_px is not None:
             arrays["depth_px"] = self.depth_px.astype(np.float32)
+        if self.piece is not None:
+            arrays["piece"] = self.piece
         write_arrays(path, **arrays)
 
     @classmethod
@@ -132,10 +180,12 @@ class LandmarkTrack:
         order = np.argsort(np.concatenate([part.frames for part in parts]), kind="stable")
         joined = {n: np.concatenate([getattr(p, n) for p in parts])[order] for n in _ARRAYS}
         depth = [part.depth_px for part in parts if part.depth_px is not None]
+        piece = np.concatenate([part.pieces for part in parts])[order]
         return cls(
             **joined,
             landmark_set=parts[0].landmark_set,
             depth_px=np.concatenate(depth)[order] if len(depth) == len(parts) else None,
+            piece=piece if any(part.piece is not None for part in parts) else None,
         )
 
 
@@ -161,4 +211,9 @@ def _read_track(path: str | Path) -> LandmarkTrack:
         read_arrays(path, "landmark file", _ARRAYS)  # says what is missing
     name = str(arrays.get("landmark_set", IBUG66.name))
     own = {key: arrays[key] for key in _ARRAYS}
-    return LandmarkTrack(**own, landmark_set=set_of(name), depth_px=arrays.get("depth_px"))
+    return LandmarkTrack(
+        **own,
+        landmark_set=set_of(name),
+        depth_px=arrays.get("depth_px"),
+        piece=arrays.get("piece"),
+    )

@@ -111,7 +111,13 @@ def find_key_frames(
         first = first or look
         region[row], patch[row] = first.region_distance(look), first.patch_distance(look)
     is_given = np.isin(track.frames, list(given)) & np.isfinite(region)
-    chosen = choose_key_frames(region, patch, is_given, settings or KeyFrameSettings())
+    chosen: dict[int, str] = {}
+    for number in np.unique(track.pieces):  # every piece between cuts has key frames of its own
+        own = np.flatnonzero(track.pieces == number)
+        found = choose_key_frames(
+            region[own], patch[own], is_given[own], settings or KeyFrameSettings()
+        )
+        chosen |= {int(own[row]): kind for row, kind in found.items()}
     rows = np.array(sorted(chosen), dtype=int)
     return KeyFrames(
         track.frames[rows],

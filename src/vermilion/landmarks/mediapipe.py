@@ -18,12 +18,10 @@ import numpy as np
 
 from vermilion.imaging.display import srgb8
 from vermilion.landmarks import mediapipe_runner
-from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.detector import MAX_FACES, Landmarks, most_prominent
 from vermilion.landmarks.sets import MEDIAPIPE478, LandmarkSet
 from vermilion.storage.errors import InputError
 
-#: Faces that are looked for beside the one that counts.
-MAX_FACES = 4
 
 
 class MediapipeDetector:
@@ -42,8 +40,7 @@ class MediapipeDetector:
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
         """Landmarks of the largest face in `linear_rgb` (h, w, 3) float32."""
-        faces = self.faces(linear_rgb)
-        return faces[0] if faces else Landmarks.none(self.landmark_set)
+        return most_prominent(self.faces(linear_rgb), self.landmark_set)
 
     def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
         """Up to `MAX_FACES` faces in `linear_rgb` (h, w, 3) float32, the largest first.

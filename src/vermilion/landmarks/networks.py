@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.detector import MAX_FACES, Landmarks, apart, most_prominent
 from vermilion.landmarks.network_input import SIZE, network_input
 from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.errors import InputError
@@ -50,17 +50,16 @@ class NetworkDetector:
 
     def detect(self, linear_rgb: np.ndarray) -> Landmarks:
         """Landmarks of the face in `linear_rgb` (h, w, 3) with the highest score times size."""
-        candidates = self._faces(linear_rgb)
-        best = Landmarks.none()
-        for box in candidates[:3]:
-            found = self._points_in(linear_rgb, box)
-            if found.confidence.mean() > best.confidence.mean():
-                best = found
-            if best.confidence.mean() >= self.settings.landmark_threshold:
-                return best
-        return Landmarks.none()
+        return most_prominent(self.faces(linear_rgb), self.landmark_set)
 
-    def _faces(self, image: np.ndarray) -> list[np.ndarray]:
+    def faces(self, linear_rgb: np.ndarray) -> list[Landmarks]:
+        """Faces in `linear_rgb` (h, w, 3), those with the highest score times size first."""
+        found = [self._points_in(linear_rgb, box) for box in self._boxes(linear_rgb)[:MAX_FACES]]
+        threshold = self.settings.landmark_threshold
+        sure = [f for f in found if f.found and f.confidence.mean() >= threshold]
+        return apart(sure, MAX_FACES)
+
+    def _boxes(self, image: np.ndarray) -> list[np.ndarray]:
         """Boxes (x, y, width, height) px expected round the landmarks of the faces.
 
         The most prominent face is first.

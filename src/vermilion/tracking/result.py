@@ -104,6 +104,7 @@ class TrackedTake:
         reprojection_px: (F,) RMS over all landmarks except the jaw's; NaN where none were found.
         camera_name, camera_model, camera_params, camera_size_px, cam_from_world: the camera of the
             images, with the focal length that was used.
+        piece: (F,) int piece between cuts of each frame, counted from 0; None: all in one.
     """
 
     frames: np.ndarray
@@ -118,6 +119,7 @@ class TrackedTake:
     camera_params: np.ndarray
     camera_size_px: np.ndarray
     cam_from_world: np.ndarray
+    piece: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -127,6 +129,7 @@ class TrackedTake:
         valid: np.ndarray,
         camera: Camera,
         model: FaceModel,
+        piece: np.ndarray | None = None,
     ) -> TrackedTake:
         """Motion relative to the camera, carried to the world.
 
@@ -136,6 +139,7 @@ class TrackedTake:
             valid: (F,) bool, frames that can be trusted.
             camera: of the images, with the focal length that was used.
             model: the tracker's.
+            piece: (F,) int piece of each frame; None: all in one.
         """
         to_world = camera.rotation.T
         return cls(
@@ -152,7 +156,19 @@ class TrackedTake:
             camera_params=np.array(camera.params, dtype=np.float64),
             camera_size_px=np.array([camera.width_px, camera.height_px]),
             cam_from_world=np.asarray(camera.cam_from_world, dtype=np.float64),
+            piece=None if piece is None else np.asarray(piece),
         )
+
+    @property
+    def pieces(self) -> np.ndarray:
+        """(F,) int piece between cuts of each frame: what follows time stops where it changes."""
+        none = np.zeros(len(self.frames), dtype=np.int64)
+        return none if self.piece is None else np.asarray(self.piece)
+
+    def piece_span(self, frame: int) -> tuple[int, int]:
+        """First and last frame of the piece that a frame is in, frame numbers."""
+        own = self.frames[self.pieces == self.pieces[self.index_of([frame])[0]]]
+        return int(own[0]), int(own[-1])
 
     @property
     def camera(self) -> Camera:
@@ -193,17 +209,18 @@ class TrackedTake:
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""
         arrays = {name: np.asarray(getattr(self, name)) for name in _names(TrackedTake)}
-        write_arrays(path, compressed=False, **arrays)
+        write_arrays(path, compressed=False, **arrays, piece=self.pieces)
 
     @classmethod
     def load(cls, path: str | Path) -> TrackedTake:
         """Read what `save` wrote."""
-        return cls(**_load(path, cls))
+        piece = read_arrays(path, "TrackedTake of the tracker").get("piece")
+        return cls(**_load(path, cls), piece=piece)
 
 
 def _names(kind: type) -> list[str]:
     """The fields of a record that are arrays."""
-    return [item.name for item in fields(kind) if item.name != "places"]
+    return [item.name for item in fields(kind) if item.name not in ("places", "piece")]
 
 
 def _load(path: str | Path, kind: type) -> dict[str, np.ndarray]:

@@ -16,7 +16,11 @@ def landmark_fit_settings(
     motion = {k: v for k, v in (motion or {}).items() if k != "max_reprojection"}
     noise = LandmarkNoise(**fit["noise"], robust_sigmas=fit["robust_sigmas"])
     return LandmarkFitSettings(
-        noise=noise, weight_sigma=fit["weight_sigma"], jaw_slide=fit["jaw_slide"], **motion
+        noise=noise,
+        weight_sigma=fit["weight_sigma"],
+        lid_weight_sigma=fit["lid_weight_sigma"],
+        jaw_slide=fit["jaw_slide"],
+        **motion,
     )
 
 

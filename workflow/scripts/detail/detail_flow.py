@@ -1,6 +1,8 @@
 """Correct the coarse meshes of a chunk by six-frame flow; residuals and a checkerboard."""
 
-from vermilion.detail.flow.chunk import correct_frames
+from functools import cache
+
+from vermilion.detail.flow.chunk import correct_frames, neighbours
 from vermilion.detail.flow.deformation import DeformationSettings
 from vermilion.detail.flow.frame import FlowCorrection, FlowCorrectionSettings
 from vermilion.detail.flow.overlay import checkerboard_sheet
@@ -8,6 +10,7 @@ from vermilion.detail.flow.six_frame_flow import FlowSettings
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, rows_of_frames, write_sequence
@@ -18,7 +21,8 @@ from vermilion.tracking.result import TrackedTake
 def main(snakemake):
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    model, camera = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit).camera
+    model, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    camera, rows = fit.camera, {int(frame): row for row, frame in enumerate(fit.frames)}
     source = open_frames(params.source, subject, take)
     first, last = params.span
     places = rows_of_frames(inputs.coarse, range(first, last + 1))
@@ -35,8 +39,27 @@ def main(snakemake):
         FlowSettings(**cfg["detail.flow"]),
         DeformationSettings(**cfg["detail.deformation"]),
     )
-    correction = FlowCorrection(model, camera, read_image(first), read_mesh(first), settings)
-    chunk = correct_frames(correction, params.frames, (first, last), read_image, read_mesh)
+
+    @cache
+    def correction_of_piece(piece):
+        # Each piece between cuts has the texture of its own first frame.
+        start = int(fit.frames[fit.valid & (fit.pieces == piece)][0])
+        return FlowCorrection(model, camera, read_image(start), read_mesh(start), settings)
+
+    def correction_of(frame):
+        if not fit.valid[rows[frame]]:
+            raise InputError(
+                "a frame that was not tracked", "the face", "See the landmarks' quality."
+            )
+        return correction_of_piece(int(fit.pieces[rows[frame]]))
+
+    chunk = correct_frames(
+        correction_of,
+        params.frames,
+        lambda frame: neighbours(frame, fit.frames, fit.valid, fit.pieces),
+        read_image,
+        read_mesh,
+    )
     before = [read_mesh(frame) for frame in params.frames]
     image = checkerboard_sheet(
         read_image, camera, model, params.frames, before, chunk.vertices_mm,

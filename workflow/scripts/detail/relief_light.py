@@ -8,6 +8,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
+from vermilion.tracking.result import TrackedTake
 
 
 def main(snakemake):
@@ -18,7 +19,8 @@ def main(snakemake):
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     source = open_frames(params.source, *place)
     scene = ReliefScene.open(topology, inputs, source, (first, last), cfg["detail.relief.face_px"])
-    frames, seen = range(first, min(first + cfg["detail.relief.light_frames"], last + 1)), {}
+    fit, count = TrackedTake.load(inputs.fit), cfg["detail.relief.light_frames"]
+    frames, seen = fit.frames[fit.valid & (fit.pieces == fit.pieces[0])][:count].tolist(), {}
     for frame in frames:
         try:
             seen[frame] = scene.observe(frame, scene.fine(frame))
@@ -26,7 +28,7 @@ def main(snakemake):
             continue
     if not any(observed.trust.any() for observed in seen.values()):
         raise InputError(
-            f"no face in the frames {frames[0]} to {frames[-1]}",
+            f"no face in the first frames, {', '.join(map(str, frames)) or 'none of which was tracked'}",
             "a first frame that shows the face",
             "Begin the take where the face is seen, or raise detail.relief.light_frames.",
             subject=place[0],

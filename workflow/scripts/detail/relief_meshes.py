@@ -25,6 +25,7 @@ from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
 from vermilion.storage.tables import write_table
+from vermilion.tracking.result import TrackedTake
 
 
 def main(snakemake):
@@ -33,7 +34,7 @@ def main(snakemake):
     model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
     topology = FineTopology.of(model, cfg["detail.relief.levels"])
     first, last = params.span
-    own = params.frames[0], params.frames[-1]
+    own, fit = (params.frames[0], params.frames[-1]), TrackedTake.load(inputs.fit)
     source = open_frames(params.source, *place)
     scene = ReliefScene.open(topology, inputs, source, own, cfg["detail.relief.face_px"])
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
@@ -44,7 +45,8 @@ def main(snakemake):
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):
             smooth = scene.fine(frame)
-            mesh = mesh_with_relief(topology, smooth, reader, frame, (first, last), window, weight)
+            span = fit.piece_span(frame)  # normals are not averaged across a cut
+            mesh = mesh_with_relief(topology, smooth, reader, frame, span, window, weight)
             drawn = maps.draw(smooth, mesh)
             names = zip("RGB", np.moveaxis(drawn, 2, 0), strict=True)
             write_channels(folder / f"{frame:06d}.exr", dict(names))

@@ -36,7 +36,7 @@ def main(snakemake):
         views.append(start.view(row, image, face, options["pixel_mm"], len(settings.iterations)))
     appearance = learn_appearance(
         fit.frames[rows], views, face, samples, options["albedo_prior"], options["rounds"],
-        lambda found: FrameProblem(face, found, settings, start.settings.weight_sigma),
+        lambda found: FrameProblem(face, found, settings, start.weight_sigmas),
     )  # fmt: skip
     light = np.round(appearance.light[0], 3)
     print(f"frames {appearance.frames}, light {light}, spread {np.median(appearance.spread):.2f}")

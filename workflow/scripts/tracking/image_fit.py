@@ -14,8 +14,8 @@ def main(snakemake):
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
     chunk = FrameChunk.load(snakemake.input, source, cfg, params.frames)
     settings = FrameFitSettings(**cfg["tracking.image_fit.frame_fit"])
-    weight_sigma = chunk.start.settings.weight_sigma
-    problem = FrameProblem(chunk.face, chunk.appearance, settings, weight_sigma)
+    sigmas = chunk.start.weight_sigmas
+    problem = FrameProblem(chunk.face, chunk.appearance, settings, sigmas)
     write_arrays(snakemake.output[0], frames=np.array(params.frames), **fit_frames(chunk, problem))
 
 

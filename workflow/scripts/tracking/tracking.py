@@ -1,5 +1,6 @@
 """Pose and blend weights of a whole take."""
 
+from vermilion.capture.video_facts import uneven_times
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
@@ -7,6 +8,7 @@ from vermilion.storage.logfile import log_to
 from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, with_focal
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.landmark_fit.timeline import Timeline
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import landmark_fit_settings
 from vermilion.tracking.validity import valid_frames
@@ -23,10 +25,13 @@ def main(snakemake):
     seen = Observations.of(track, camera)
     shape = LandmarkShape.of(tracker, person.identity, person.landmark_offset_mm)
     settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
-    motion = fit_motion(shape, seen, focal_px(camera), snakemake.params.fps, settings)
+    times = uneven_times(inputs.get("video"), track.frames)
+    timeline = Timeline.of(len(track.frames), snakemake.params.fps, track.pieces, times)
+    motion = fit_motion(shape, seen, focal_px(camera), timeline, settings)
     limit = cfg["tracking.motion"]["max_reprojection"]
     valid = valid_frames(motion, shape, focal_px(camera), limit)
-    TrackedTake.of(track.frames, motion, valid, camera, tracker).save(snakemake.output.fit)
+    fit = TrackedTake.of(track.frames, motion, valid, camera, tracker, track.pieces)
+    fit.save(snakemake.output.fit)
 
 
 if __name__ == "__main__":

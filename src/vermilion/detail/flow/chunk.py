@@ -45,28 +45,29 @@ class CorrectedChunk:
 
 
 def correct_frames(
-    correction: FlowCorrection,
+    correction_of: Callable[[int], FlowCorrection],
     frames: Sequence[int],
-    span: tuple[int, int],
+    near: Callable[[int], list[int]],
     read_image: Callable[[int], np.ndarray],
     read_mesh: Callable[[int], np.ndarray],
 ) -> CorrectedChunk:
     """Correct frames one by one.
 
     Args:
-        correction: of the take.
+        correction_of: frame -> correction of its piece of the take, or InputError where it was not tracked.
         frames: numbers of the frames.
-        span: first and last frame of the take; at its ends a frame replaces its missing neighbour.
+        near: frame -> itself, the next and the one before; itself in place of one that is not there
+            (`neighbours`).
         read_image: frame -> image (h, w, 3), linear RGB, or InputError.
         read_mesh: frame -> coarse mesh (V, 3) mm, world.
     """
     image_of = lru_cache(maxsize=4)(read_image)
     results = []
     for frame in progress(list(frames), "corrective flow"):
-        near = [frame, min(frame + 1, span[1]), max(frame - 1, span[0])]
         try:
-            images = [image_of(f) for f in near]
-            found = correction.correct(images, np.stack([read_mesh(f) for f in near]))
+            correction, three = correction_of(frame), near(frame)
+            images = [image_of(f) for f in three]
+            found = correction.correct(images, np.stack([read_mesh(f) for f in three]))
             results.append((found, ""))
         except InputError as error:
             results.append((_uncorrected(read_mesh(frame)), f"not corrected: {error}"))
@@ -81,6 +82,24 @@ def correct_frames(
         np.array([result.flow_px for result in done]),
         tuple(reason for _, reason in results),
     )
+
+
+def neighbours(frame: int, frames: np.ndarray, valid: np.ndarray, piece: np.ndarray) -> list[int]:
+    """A frame, the next and the one before; itself in place of one that no image of its shot can be compared with.
+
+    Args:
+        frame: number of a frame.
+        frames: (F,) numbers of the take's frames.
+        valid: (F,) bool, frames that were tracked.
+        piece: (F,) int piece between cuts of each frame.
+    """
+    rows = {int(number): row for row, number in enumerate(frames)}
+
+    def usable(other: int) -> bool:
+        row = rows.get(other)
+        return row is not None and bool(valid[row]) and piece[row] == piece[rows[frame]]
+
+    return [frame, *(f if usable(f) else frame for f in (frame + 1, frame - 1))]
 
 
 def _uncorrected(vertices_mm: np.ndarray) -> CorrectedFrame:

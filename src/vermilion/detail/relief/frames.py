@@ -39,7 +39,7 @@ class ReliefScene:
     Attributes:
         topology: of the fine meshes.
         camera: of the images.
-        read_image: frame -> image (h, w, 3), linear RGB, or InputError.
+        read_image: frame -> image (h, w, 3), linear RGB, or InputError, also where it was not tracked.
         read_mesh: frame -> coarse mesh (V, 3) mm, world.
         face_px: longest side of the face in the images that are compared.
     """
@@ -60,7 +60,8 @@ class ReliefScene:
         face_px: int,
     ) -> ReliefScene:
         """Images of a source, and coarse meshes of the frames from `span[0]` to `span[1]`."""
-        camera = TrackedTake.load(inputs.fit).camera
+        fit = TrackedTake.load(inputs.fit)
+        camera, tracked = fit.camera, set(fit.frames[fit.valid].tolist())
         places = rows_of_frames(inputs.meshes, range(span[0], span[1] + 1))
 
         def read_mesh(frame: int) -> np.ndarray:
@@ -68,6 +69,10 @@ class ReliefScene:
             return read_sequence(path)[row]
 
         def read_image(frame: int) -> np.ndarray:
+            if frame not in tracked:  # its mesh is its neighbours', its image tells nothing of it
+                raise InputError(
+                    "no track", "the face", "See the quality of the track.", frame=frame
+                )
             return source.read(camera.name, frame)
 
         return cls(topology, camera, read_image, read_mesh, face_px)

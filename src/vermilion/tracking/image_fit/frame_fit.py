@@ -105,12 +105,13 @@ class FrameProblem:
         face: SampledFace,
         appearance: Appearance,
         settings: FrameFitSettings,
-        weight_sigma: float,
+        weight_sigma: float | np.ndarray,
     ):
+        """`weight_sigma` is the deviation of the blend weights about zero: one, or (K,)."""
         self.face, self.appearance, self.settings = face, appearance, settings
         n_weights = face.expressions_mm.shape[2]
-        self.weight_prior = np.full(N_POSE + n_weights, weight_sigma**-2.0)
-        self.weight_prior[:N_POSE] = 0.0
+        self.weight_prior = np.zeros(N_POSE + n_weights)
+        self.weight_prior[N_POSE:] = np.asarray(weight_sigma, dtype=float) ** -2.0
         s = settings
         typical = np.full(N_POSE + n_weights, s.weight)
         typical[:3], typical[3:5], typical[5] = (

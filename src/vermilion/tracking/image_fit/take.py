@@ -103,6 +103,12 @@ class TakeStart:
         model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
         return fit, rows, cls.of(model, identity, fit, track, settings, rows)
 
+    @property
+    def weight_sigmas(self) -> np.ndarray:
+        """(K,) deviations of the blend weights about zero."""
+        names = tuple(self.model.expression_names)
+        return self.settings.weight_sigmas(names, len(names))
+
     def face(self, samples: SurfacePoints) -> SampledFace:
         """The person at some samples."""
         return SampledFace.of(self.model, self.identity.neutral_mm, samples)

@@ -18,9 +18,16 @@ class BandMatrix:
         blocks: (F, P, P) symmetric blocks on the diagonal.
         second: (F - 2, P) weights of squared second differences over time.
         first: (F - 1, P) weights of squared first differences over time.
+        stencils: (F - 2, 3) factors of the second differences; None: 1, -2, 1.
     """
 
-    def __init__(self, blocks: np.ndarray, second: np.ndarray, first: np.ndarray):
+    def __init__(
+        self,
+        blocks: np.ndarray,
+        second: np.ndarray,
+        first: np.ndarray,
+        stencils: np.ndarray | None = None,
+    ):
         self.n_frames, self.n_params = blocks.shape[:2]
         n, p = self.n_frames, self.n_params
         self.u = 2 * p if n > 2 else (p if n == 2 else p - 1)
@@ -29,18 +36,23 @@ class BandMatrix:
         at = np.arange(n)[:, None] * p + columns
         self.band[self.u + rows - columns, at] = blocks[:, rows, columns]
         if n > 1:
-            self._add_differences(first, (-1.0, 1.0))
+            self._add_differences(first, np.tile([-1.0, 1.0], (n - 1, 1)))
         if n > 2:
-            self._add_differences(second, (1.0, -2.0, 1.0))
+            even = np.tile([1.0, -2.0, 1.0], (n - 2, 1))
+            self._add_differences(second, even if stencils is None else stencils)
 
-    def _add_differences(self, weights: np.ndarray, stencil: tuple[float, ...]) -> None:
-        """Add sum_f weights[f] (stencil . x[f:])^2 for each parameter."""
+    def _add_differences(self, weights: np.ndarray, stencils: np.ndarray) -> None:
+        """Add sum_f weights[f] (stencils[f] . x[f:])^2 for each parameter.
+
+        `weights` are (n, P), `stencils` (n, frames that a difference takes).
+        """
         p = self.n_params
-        count = len(weights)
-        for i, a in enumerate(stencil):
-            for j, b in enumerate(stencil[i:], start=i):
+        count, width = stencils.shape
+        for i in range(width):
+            for j in range(i, width):
                 columns = ((np.arange(count) + j)[:, None] * p + np.arange(p)).reshape(-1)
-                self.band[self.u - (j - i) * p, columns] += (a * b * weights).reshape(-1)
+                both = (stencils[:, i] * stencils[:, j])[:, None] * weights
+                self.band[self.u - (j - i) * p, columns] += both.reshape(-1)
 
     def times(self, x: np.ndarray) -> np.ndarray:
         """Product (F, P) with x (F, P)."""

@@ -4,13 +4,15 @@ Gauss-Newton solves all frames at once. The energy is
 
     sum over frames and landmarks of rho(|whitened residual|)       rho: Cauchy
     + sum over frames of |w_f|^2 / weight_sigma^2                    w in [0, 1]
-    + sum over frames of |second difference of pose and weights|^2   over their typical sizes
+    + sum over frames of |acceleration of pose and weights|^2        over their typical sizes
 
-Smoothing is symmetric in time: it does not lag.
+Smoothing is symmetric in time: it does not lag. It ends at cuts, and lets fast motion of lids and mouth through
+(`smoothness`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,7 +31,9 @@ from vermilion.tracking.landmark_fit.observation import (
     whitening,
 )
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.landmark_fit.smoothness import TemporalSmoothness, fast_shapes
 from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess
+from vermilion.tracking.landmark_fit.timeline import Timeline
 
 N_POSE = 6
 _FRAMES_AT_ONCE = 256
@@ -44,6 +48,8 @@ class LandmarkFitSettings:
         weight_sigma: deviation of a blend weight about zero.
         rotation_acceleration_deg, translation_acceleration_mm, weight_acceleration: typical
             accelerations, per second squared; infinite switches smoothness off.
+        fast_limit: lids or mouth that accelerate this many times as much as noise does are half free.
+        lid_weight_sigma: deviation of the lids' weights about zero: blinks are none too rare.
         jaw_slide: weight of the residual along the jaw line, 0 (slides freely) to 1.
         iterations: Gauss-Newton steps, at most.
         tolerance_mm: stop when no landmark moves more.
@@ -53,17 +59,41 @@ class LandmarkFitSettings:
     weight_sigma: float = 0.5
     rotation_acceleration_deg: float = 400.0
     translation_acceleration_mm: float = 600.0
-    weight_acceleration: float = 60.0
+    weight_acceleration: float = 40.0
+    fast_limit: float = 3.5
+    lid_weight_sigma: float = 1.0
     jaw_slide: float = 0.1
     iterations: int = 15
     tolerance_mm: float = 0.01
 
-    def smoothness(self, n_weights: int, fps: float) -> np.ndarray:
-        """(6 + K,) weights of squared second differences of pose and blend weights over time."""
+    def typical_acceleration(self, n_weights: int) -> np.ndarray:
+        """(6 + K,) of pose and K = `n_weights` blend weights, per second squared."""
         typical = np.full(N_POSE + n_weights, float(self.weight_acceleration))
         typical[:3] = np.radians(self.rotation_acceleration_deg)
         typical[3:N_POSE] = self.translation_acceleration_mm
-        return (fps**2 / typical) ** 2
+        return typical
+
+    def smoothness(
+        self, shape: LandmarkShape, timeline: Timeline, known: np.ndarray, weights: np.ndarray
+    ) -> TemporalSmoothness:
+        """Of pose and blend weights over time.
+
+        Args:
+            shape: the person's landmarks.
+            timeline: of F frames.
+            known: (F,) bool, frames that bind their neighbours.
+            weights: (F, K) of each frame by itself, which tell what moves fast.
+        """
+        fast = fast_shapes(shape, shape.sigma_mm(self.noise), self.weight_sigma)
+        typical = self.typical_acceleration(shape.n_expressions)
+        return TemporalSmoothness.of(typical, timeline, known, weights, fast, self.fast_limit)
+
+    def weight_sigmas(self, names: Sequence[str], n_weights: int) -> np.ndarray:
+        """(K,) deviations of K = `n_weights` blend weights about zero; `names` of the shapes, or none."""
+        sigma = np.full(n_weights, float(self.weight_sigma))
+        lids = [k for k, name in enumerate(names) if name.startswith("eyeBlink")]
+        sigma[lids] = max(self.lid_weight_sigma, self.weight_sigma)
+        return sigma
 
 
 @dataclass(frozen=True)
@@ -88,23 +118,25 @@ def fit_motion(
     shape: LandmarkShape,
     seen: Observations,
     focal_px: float,
-    fps: float,
+    timeline: Timeline | float,
     settings: LandmarkFitSettings | None = None,
 ) -> HeadMotion:
-    """Fit all frames of a take. Frames without landmarks are interpolated.
+    """Fit all frames of a take. Frames without landmarks are interpolated between those of their piece.
 
     Args:
         shape: the person's landmarks.
         seen: F frames.
         focal_px: of the camera.
-        fps: frames a second.
+        timeline: of the F frames; or frames a second, of evenly spaced frames without a cut.
         settings: noise and priors.
 
     Raises:
         InputError: no frame has landmarks.
     """
     settings = settings or LandmarkFitSettings()
-    problem = _TakeProblem(shape, seen, focal_px, fps, settings)
+    if not isinstance(timeline, Timeline):
+        timeline = Timeline.of(len(seen.image), timeline)
+    problem = _TakeProblem(shape, seen, focal_px, timeline, settings)
     x = problem.first_guess()
     cost = problem.cost(x)
     for _ in range(settings.iterations):
@@ -131,28 +163,22 @@ class _TakeProblem:
         shape: LandmarkShape,
         seen: Observations,
         focal_px: float,
-        fps: float,
+        timeline: Timeline,
         settings: LandmarkFitSettings,
     ):
         require_landmarks([seen])
         self.shape, self.seen, self.focal, self.settings = shape, seen, focal_px, settings
         self.n_frames, self.n_weights = len(seen.image), shape.n_expressions
         self.sigma_mm = shape.sigma_mm(settings.noise)
-        self.prior = np.zeros(N_POSE + self.n_weights)
-        self.prior[N_POSE:] = settings.weight_sigma**-2.0
+        sigmas = settings.weight_sigmas(shape.expression_names, self.n_weights)
+        self.prior = np.concatenate([np.zeros(N_POSE), sigmas**-2.0])
         self.lower = np.concatenate([np.full(N_POSE, -np.inf), np.zeros(self.n_weights)])
         self.upper = np.concatenate([np.full(N_POSE, np.inf), np.ones(self.n_weights)])
-        self.second, self.first = self._smoothness(fps)
-
-    def _smoothness(self, fps: float) -> tuple[np.ndarray, np.ndarray]:
-        strength = self.settings.smoothness(self.n_weights, fps)
-        valid = self.seen.valid
-        triples = valid[:-2] & valid[1:-1] & valid[2:]
+        self.timeline = timeline
         # Across gaps: straight lines, which cannot overshoot.
-        pairs = ~(valid[:-1] & valid[1:])
-        floor = 1e-12
-        first = np.maximum(pairs[:, None] * np.maximum(strength, 1e-6), floor)
-        return triples[:, None] * strength, first
+        typical = settings.typical_acceleration(self.n_weights)
+        strength = np.maximum((timeline.fps**2 / typical) ** 2, 1e-6)
+        self.first = np.maximum(timeline.bridges(seen.valid)[:, None] * strength, 1e-12)
 
     def first_guess(self) -> np.ndarray:
         """(F, 6 + K) of each frame fitted independently, gaps interpolated."""
@@ -162,11 +188,16 @@ class _TakeProblem:
             self.shape, self.seen[known], self.sigma_mm, focal, self.settings.weight_sigma
         )
         # Fixed from here on: deviations that grew as the head came nearer would pull it nearer.
-        scale = fill_gaps(self.focal / translation[:, 2:], known, self.n_frames)
+        piece = self.timeline.piece
+        scale = fill_gaps(self.focal / translation[:, 2:], known, piece)
         self.sigma_px = self.sigma_mm * scale
         vectors, self.reference = log_about_mean(rotation)
         values = np.concatenate([vectors, translation, weights], axis=1)
-        return fill_gaps(values, known, self.n_frames)
+        x = fill_gaps(values, known, piece)
+        self.smoothness = self.settings.smoothness(
+            self.shape, self.timeline, self.seen.valid, x[:, N_POSE:]
+        )
+        return x
 
     def _camera_points(self, x: np.ndarray) -> np.ndarray:
         rotation = exp_about_mean(x[:, :3], self.reference)
@@ -180,16 +211,14 @@ class _TakeProblem:
         )
         total += 0.5 * (self.prior * x**2).sum()
         total += 0.5 * (self.first * np.diff(x, axis=0) ** 2).sum()
-        if self.n_frames > 2:
-            total += 0.5 * (self.second * np.diff(x, n=2, axis=0) ** 2).sum()
-        return float(total)
+        return float(total) + self.smoothness.cost(x)
 
     def quadratic_minimum(self, x: np.ndarray) -> np.ndarray:
         """Minimum (F, 6 + K), within the box, of the energy's quadratic model at x (F, 6 + K)."""
         blocks, right = self._data_terms(x)
         diagonal = np.arange(N_POSE + self.n_weights)
         blocks[:, diagonal, diagonal] += self.prior
-        matrix = BandMatrix(blocks, self.second, self.first)
+        matrix = BandMatrix(blocks, self.smoothness.weights, self.first, self.timeline.stencils)
         return solve_in_box(matrix, right, self.lower, self.upper, start=x)
 
     def _data_terms(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

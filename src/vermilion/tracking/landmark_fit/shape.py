@@ -21,12 +21,14 @@ class LandmarkShape:
         expressions_mm: (K, N, 3).
         landmark_set: what the N landmarks are.
         known: (N,) bool, landmarks that the model has a place for; None: all.
+        expression_names: K names, which say what moves fast; empty: nothing does.
     """
 
     neutral_mm: np.ndarray
     expressions_mm: np.ndarray
     landmark_set: LandmarkSet = IBUG66
     known: np.ndarray | None = None
+    expression_names: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -50,9 +52,10 @@ class LandmarkShape:
         if offset_mm is not None:
             neutral = neutral + offset_mm
         expressions = _at_landmarks(model.expressions_mm, model, places)
+        names = tuple(model.expression_names)
         if places is None:
-            return cls(neutral, expressions)
-        return cls(neutral, expressions, places.landmark_set, places.known)
+            return cls(neutral, expressions, expression_names=names)
+        return cls(neutral, expressions, places.landmark_set, places.known, names)
 
     @property
     def n_expressions(self) -> int:

@@ -55,8 +55,15 @@ def first_guess(
     return rotation, translation, weights
 
 
-def fill_gaps(values: np.ndarray, known: np.ndarray, n_frames: int) -> np.ndarray:
-    """Values (F, P) of all frames from `values` (M, P) of frames `known` (M,): linear, ends held."""
-    every = np.arange(n_frames)
-    columns = [np.interp(every, known, column) for column in values.T]
-    return np.stack(columns, axis=1)
+def fill_gaps(values: np.ndarray, known: np.ndarray, piece: np.ndarray) -> np.ndarray:
+    """Values (F, P) of all frames from `values` (M, P) of frames `known` (M,): linear, ends held.
+
+    A piece between cuts, `piece` (F,) int of each frame, is filled from its own frames if it has any.
+    """
+    every = np.arange(len(piece))
+    filled = np.stack([np.interp(every, known, column) for column in values.T], axis=1)
+    for number in np.unique(piece[known]):
+        rows, own = np.flatnonzero(piece == number), piece[known] == number
+        columns = [np.interp(rows, known[own], column) for column in values[own].T]
+        filled[rows] = np.stack(columns, axis=1)
+    return filled

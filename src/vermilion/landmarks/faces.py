@@ -1,0 +1,214 @@
+"""All faces that a detector sees in some frames of a take, and what these frames look like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.landmarks.cuts import FrameLooks, look_of, no_look
+from vermilion.landmarks.detector import Landmarks
+from vermilion.landmarks.gradients import grey_of
+from vermilion.landmarks.scheme import JAW, N_LANDMARKS, face_size_px, interocular_px
+from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
+from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
+from vermilion.storage.progress import progress
+
+#: Landmarks of brows, eyes, nose and mouth.
+INNER_FACE = np.arange(len(JAW), N_LANDMARKS)
+#: Deviation of the blur of an image that shows what its pixels can.
+_SHARP_PX = 1.0
+
+
+@dataclass(frozen=True)
+class SeenFaces:
+    """M faces in F frames.
+
+    Attributes:
+        frames: (F,) int frame numbers.
+        looks: of the frames.
+        reasons: (F,) str, why a frame could not be looked at; empty where it was.
+        frame: (M,) int, the frame number of each face.
+        centre_px: (M, 2) middle of its landmarks' box.
+        size_px: (M,) root of its box's area.
+        eyes_px: (M,) distance of its outer eye corners.
+        sharp_eyes_px: (M,) the same in an image just sharp enough: less where the face is blurred.
+        sureness: (M,) mean confidence in [0, 1].
+        shape: (M, 66, 3) its landmarks with depth, about their mean, by the size; depth zero where the
+            detector tells none.
+        image_size_px: (2,) width and height of the images; zero where none was read.
+    """
+
+    frames: np.ndarray
+    looks: FrameLooks
+    reasons: np.ndarray
+    frame: np.ndarray
+    centre_px: np.ndarray
+    size_px: np.ndarray
+    eyes_px: np.ndarray
+    sharp_eyes_px: np.ndarray
+    sureness: np.ndarray
+    shape: np.ndarray
+    image_size_px: np.ndarray
+
+    @classmethod
+    def load(cls, paths: Sequence[str | Path]) -> SeenFaces:
+        """Read what `FaceFinds.save` wrote, of all chunks of a take; landmarks are left alone."""
+        names = ("frames", "thumbnails", "colours", "reasons", "image_size_px", *_PER_FACE)
+        parts = [read_arrays(path, "file of faces", names) for path in paths]
+        joined = {n: np.concatenate([p[n] for p in parts]) for n in names if n != "image_size_px"}
+        looks = FrameLooks(joined.pop("thumbnails"), joined.pop("colours"))
+        size = np.max([part["image_size_px"] for part in parts], axis=0)
+        return cls(looks=looks, image_size_px=size, **joined)
+
+
+@dataclass(frozen=True)
+class FaceFinds:
+    """The faces of a chunk's frames with their landmarks.
+
+    Attributes:
+        frames: (F,) int frame numbers.
+        faces: F lists of faces, the most prominent first.
+        looks: of the frames.
+        reasons: F texts, why a frame could not be looked at; empty where it was.
+        sharp_eyes_px: F lists, of each face the distance of its eyes in an image just sharp enough.
+        landmark_set: what the landmarks are.
+        image_size_px: (width, height) of the images.
+    """
+
+    frames: np.ndarray
+    faces: list[list[Landmarks]]
+    looks: FrameLooks
+    reasons: list[str]
+    sharp_eyes_px: list[list[float]]
+    landmark_set: LandmarkSet
+    image_size_px: tuple[int, int]
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        flat = [face for faces in self.faces for face in faces]
+        n_points = self.landmark_set.n_points
+        points = np.array([f.points_px for f in flat]).reshape(-1, n_points, 2)
+        compact = np.array([f.as_ibug66().points_px for f in flat]).reshape(-1, 66, 2)
+        depth = [np.zeros(n_points) if f.depth_px is None else f.depth_px for f in flat]
+        depths = np.array(depth).reshape(-1, n_points)
+        low, high, size = compact.min(axis=1), compact.max(axis=1), face_size_px(compact)
+        deep = depths[:, self.landmark_set.ibug66]
+        shape = np.concatenate([compact, deep[..., None]], axis=-1)
+        shape = (shape - shape.mean(axis=1, keepdims=True)) / size[:, None, None]
+        told = {"depth_px": depths} if any(f.depth_px is not None for f in flat) else {}
+        confidence = np.array([f.confidence for f in flat]).reshape(-1, n_points)
+        write_arrays(
+            path,
+            frames=self.frames,
+            thumbnails=self.looks.thumbnails,
+            colours=self.looks.colours,
+            reasons=np.array(self.reasons, dtype=str),
+            image_size_px=np.array(self.image_size_px),
+            frame=np.repeat(self.frames, [len(faces) for faces in self.faces]),
+            centre_px=0.5 * (low + high),
+            size_px=size,
+            eyes_px=interocular_px(compact),
+            sharp_eyes_px=np.array([px for row in self.sharp_eyes_px for px in row], dtype=float),
+            sureness=confidence.mean(axis=1),
+            shape=shape.astype(np.float32),
+            points_px=points,
+            confidence=confidence,
+            landmark_set=np.array(self.landmark_set.name),
+            **told,
+        )
+
+    @classmethod
+    def load(cls, path: str | Path) -> FaceFinds:
+        """Read what `save` wrote."""
+        arrays = read_arrays(path, "file of faces")
+        frames, kind = arrays["frames"], set_of(str(arrays["landmark_set"]))
+        faces: list[list[Landmarks]] = []
+        sharp = []
+        for frame in frames:
+            rows = np.flatnonzero(arrays["frame"] == frame)
+            sharp.append(arrays["sharp_eyes_px"][rows].tolist())
+            faces.append(
+                [
+                    Landmarks(
+                        arrays["points_px"][row],
+                        arrays["confidence"][row],
+                        True,
+                        kind,
+                        arrays["depth_px"][row] if "depth_px" in arrays else None,
+                    )
+                    for row in rows
+                ]
+            )
+        looks = FrameLooks(arrays["thumbnails"], arrays["colours"])
+        width, height = (int(n) for n in arrays["image_size_px"])
+        reasons = arrays["reasons"].tolist()
+        return cls(frames, faces, looks, reasons, sharp, kind, (width, height))
+
+
+_PER_FACE = ("frame", "centre_px", "size_px", "eyes_px", "sharp_eyes_px", "sureness", "shape")
+
+
+def find_faces(
+    read: Callable[[int], np.ndarray],
+    find: Callable[[int, np.ndarray | None], list[Landmarks]],
+    frames: Sequence[int],
+    landmark_set: LandmarkSet = IBUG66,
+) -> FaceFinds:
+    """The faces of some frames.
+
+    Args:
+        read: image (h, w, 3), linear RGB, of a frame; may raise InputError.
+        find: faces in a frame of a number, given its image, or None where it could not be read; may
+            raise InputError.
+        frames: frame numbers.
+        landmark_set: the set that `find` gives.
+    """
+    faces, looks, reasons, sharp, size = [], [], [], [], (0, 0)
+    for frame in progress(frames, "landmarks"):
+        image, reason, found, look = None, "", [], no_look()
+        try:
+            image = read(frame)
+            look, size = look_of(image), (image.shape[1], image.shape[0])
+        except InputError as error:
+            reason = str(error)
+        try:
+            found = find(frame, image)
+        except InputError as error:
+            reason = reason or str(error)
+        faces.append(found)
+        sharp.append([sharp_eyes_px(image, face) for face in found])
+        looks.append(look)
+        reasons.append(reason)
+    numbers = np.asarray(frames, dtype=np.int64)
+    return FaceFinds(numbers, faces, FrameLooks.of(looks), reasons, sharp, landmark_set, size)
+
+
+def sharp_eyes_px(image: np.ndarray | None, face: Landmarks) -> float:
+    """Distance of a face's outer eye corners, px, in an image that is just sharp enough to show it.
+
+    The steepest edges of eyes and mouth, over the contrast there, tell how wide the image's blur is. Pixels
+    finer than that count for nothing.
+
+    Args:
+        image: (h, w, 3) linear RGB; None: taken for sharp.
+        face: in the image.
+    """
+    points = face.as_ibug66().points_px
+    eyes = float(interocular_px(points))
+    if image is None:
+        return eyes
+    inner = points[INNER_FACE]
+    low = np.clip(np.floor(inner.min(axis=0)).astype(int) - 2, 0, None)
+    high = np.ceil(inner.max(axis=0)).astype(int) + 3
+    crop = image[low[1] : high[1], low[0] : high[0]]
+    if min(crop.shape[:2]) < 8:
+        return eyes
+    grey = grey_of(np.ascontiguousarray(crop))
+    steep = np.hypot(*np.gradient(grey))
+    contrast = float(np.ptp(np.percentile(grey, [2, 98])))
+    blur_px = contrast / (np.sqrt(2 * np.pi) * max(float(np.percentile(steep, 99.5)), 1e-6))
+    return eyes / max(1.0, blur_px / _SHARP_PX)

@@ -1,0 +1,21 @@
+"""The cuts of a take, and the face that is followed through it."""
+
+from vermilion.landmarks.faces import SeenFaces
+from vermilion.landmarks.following import FaceChoice, follow
+from vermilion.storage.logfile import log_to
+from vermilion.storage.tables import write_table
+
+
+def main(snakemake):
+    params, following = snakemake.params, snakemake.params.cfg["landmarks.following"]
+    choice = FaceChoice.of(params.face, following["least_eyes_px"], following["person_difference"])
+    followed = follow(SeenFaces.load(snakemake.input.faces), choice, params.one_shot)
+    for sentence in followed.sentences():
+        print(sentence)
+    write_table(snakemake.output.table, followed.table())
+    followed.save(snakemake.output.followed)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
