@@ -129,7 +129,7 @@ def two_people(root, rng, cut=None):
             image[:, ::37] = 0.9
             left, top = 100, 35
         image[60 : 60 + len(smaller), 255 : 255 + smaller.shape[1]] = smaller
-        if frame != 5:  # there only the other one is seen
+        if cut is not None or frame != 5:  # there only the other one is seen
             image[top : top + len(mine), left : left + mine.shape[1]] = mine
         write_image(root / "frames" / "cam" / f"{frame:06d}.png", image)
         truth.append(points + np.array([left, top]))
