@@ -66,6 +66,13 @@ CLASSES = {
         ("landmarks.correction",),
         unset={"fill_confidence": "confidence of a landmark that no frame detected"},
     ),
+    "landmarks.following.FaceChoice": Pair(
+        ("landmarks.following",),
+        unset={
+            "point_px": "no number of the key `face`: the largest",
+            "box_px": "no number of the key `face`: the largest",
+        },
+    ),
     "landmarks.key_frames.KeyFrameSettings": Pair(("landmarks.key_frames",)),
     "landmarks.networks.NetworkSettings": Pair(("landmarks.networks",)),
     "landmarks.training.TrainingSettings": Pair(("landmarks.training",)),

@@ -148,18 +148,7 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
     if numbers.get("fps", 1) <= 0:
         wrong.append(f"fps: found {numbers['fps']}; expected more than 0 frames a second.")
     split = value["split"] or "none"
-    if not re.fullmatch(SPLIT, split):
-        wrong.append(
-            f"split: found '{split}'; expected train, test, none or test:A-B,C-D "
-            "(frames A to B and C to D held out)."
-        )
-    elif split.startswith("test:") and {"first", "last"} <= numbers.keys():
-        for low, high in stretches(split):
-            if not numbers["first"] <= low <= high <= numbers["last"]:
-                wrong.append(
-                    f"split: found held-out frames {low} to {high}; expected them within "
-                    f"{numbers['first']} to {numbers['last']}."
-                )
+    wrong += _split_problems(split, numbers)
     face, reason = _face(value["face"])
     wrong += [reason] if reason else []
     if wrong:
@@ -176,6 +165,23 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         face,
     )
     return take, []
+
+
+def _split_problems(split: str, numbers: dict[str, float]) -> list[str]:
+    """What is wrong with a split, beside the numbers of its row."""
+    if not re.fullmatch(SPLIT, split):
+        return [
+            f"split: found '{split}'; expected train, test, none or test:A-B,C-D "
+            "(frames A to B and C to D held out)."
+        ]
+    if not split.startswith("test:") or not {"first", "last"} <= numbers.keys():
+        return []
+    return [
+        f"split: found held-out frames {low} to {high}; expected them within "
+        f"{numbers['first']} to {numbers['last']}."
+        for low, high in stretches(split)
+        if not numbers["first"] <= low <= high <= numbers["last"]
+    ]
 
 
 def _face(text: str) -> tuple[tuple[float, ...], str]:

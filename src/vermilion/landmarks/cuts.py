@@ -41,7 +41,7 @@ class FrameLooks:
 
     @classmethod
     def of(cls, looks: list[tuple[np.ndarray, np.ndarray]]) -> FrameLooks:
-        """Of frames described by `look_of`."""
+        """Of `looks`, thumbnail (18, 32, 3) and colours (216,) of each frame, as `look_of` gives them."""
         return cls(np.stack([t for t, _ in looks]), np.stack([c for _, c in looks]))
 
     @property
@@ -64,7 +64,7 @@ def _spread(images: np.ndarray) -> np.ndarray:
 
 
 def look_of(linear_rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Thumbnail (18, 32, 3) uint8 and colours (216,) float32 of an image (h, w, 3), linear RGB."""
+    """Thumbnail (18, 32, 3) uint8 and colours (216,) float32 of an image `linear_rgb` (h, w, 3)."""
     small = cv2.resize(
         linear_rgb, (2 * THUMBNAIL[0], 2 * THUMBNAIL[1]), interpolation=cv2.INTER_AREA
     )
@@ -99,7 +99,7 @@ def find_cuts(looks: FrameLooks, jumps: np.ndarray | None = None) -> np.ndarray:
         jump = np.nan_to_num(jumps[known[1:]], nan=0.0, posinf=1e3)
         jumped = (jump > _JUMP) & (jump > _TIMES * _usual(np.minimum(jump, 1.0)))
         cut |= jumped & (change > _LEAST_WITH_JUMP) & (change > _TIMES_WITH_JUMP * usual)
-    rows = [at for at in np.flatnonzero(cut) if not _is_flash(looks, known, at, change[at])]
+    rows = [at for at in np.flatnonzero(cut) if not _is_flash(looks, known, int(at), change[at])]
     return known[np.array(rows, dtype=int) + 1]
 
 

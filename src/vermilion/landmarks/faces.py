@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -99,7 +100,9 @@ class FaceFinds:
         deep = depths[:, self.landmark_set.ibug66]
         shape = np.concatenate([compact, deep[..., None]], axis=-1)
         shape = (shape - shape.mean(axis=1, keepdims=True)) / size[:, None, None]
-        told = {"depth_px": depths} if any(f.depth_px is not None for f in flat) else {}
+        arrays: dict[str, Any] = {}
+        if any(f.depth_px is not None for f in flat):
+            arrays["depth_px"] = depths
         confidence = np.array([f.confidence for f in flat]).reshape(-1, n_points)
         write_arrays(
             path,
@@ -118,7 +121,7 @@ class FaceFinds:
             points_px=points,
             confidence=confidence,
             landmark_set=np.array(self.landmark_set.name),
-            **told,
+            **arrays,
         )
 
     @classmethod
@@ -162,8 +165,8 @@ def find_faces(
 
     Args:
         read: image (h, w, 3), linear RGB, of a frame; may raise InputError.
-        find: faces in a frame of a number, given its image, or None where it could not be read; may
-            raise InputError.
+        find: faces in a frame of a number, given its image (h, w, 3), or None where it could not be
+            read; may raise InputError.
         frames: frame numbers.
         landmark_set: the set that `find` gives.
     """

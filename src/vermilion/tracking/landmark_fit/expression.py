@@ -6,8 +6,7 @@ Gauss-Newton solves all frames at once. The energy is
     + sum over frames of |w_f|^2 / weight_sigma^2                    w in [0, 1]
     + sum over frames of |acceleration of pose and weights|^2        over their typical sizes
 
-Smoothing is symmetric in time: it does not lag. It ends at cuts, and lets fast motion of lids and mouth through
-(`smoothness`).
+Smoothing is symmetric in time: it does not lag. It ends at cuts and lets fast motion through (`smoothness`).
 """
 
 from __future__ import annotations
@@ -31,7 +30,11 @@ from vermilion.tracking.landmark_fit.observation import (
     whitening,
 )
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
-from vermilion.tracking.landmark_fit.smoothness import TemporalSmoothness, fast_shapes
+from vermilion.tracking.landmark_fit.smoothness import (
+    TemporalSmoothness,
+    fast_shapes,
+    weight_sigmas,
+)
 from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess
 from vermilion.tracking.landmark_fit.timeline import Timeline
 
@@ -68,32 +71,20 @@ class LandmarkFitSettings:
 
     def typical_acceleration(self, n_weights: int) -> np.ndarray:
         """(6 + K,) of pose and K = `n_weights` blend weights, per second squared."""
-        typical = np.full(N_POSE + n_weights, float(self.weight_acceleration))
-        typical[:3] = np.radians(self.rotation_acceleration_deg)
-        typical[3:N_POSE] = self.translation_acceleration_mm
-        return typical
+        turn, move = np.radians(self.rotation_acceleration_deg), self.translation_acceleration_mm
+        return np.repeat([turn, move, self.weight_acceleration], [3, 3, n_weights])
 
     def smoothness(
         self, shape: LandmarkShape, timeline: Timeline, known: np.ndarray, weights: np.ndarray
     ) -> TemporalSmoothness:
-        """Of pose and blend weights over time.
-
-        Args:
-            shape: the person's landmarks.
-            timeline: of F frames.
-            known: (F,) bool, frames that bind their neighbours.
-            weights: (F, K) of each frame by itself, which tell what moves fast.
-        """
+        """Of pose and `weights` (F, K), those of each frame by itself; `known` (F,) bind their neighbours."""
         fast = fast_shapes(shape, shape.sigma_mm(self.noise), self.weight_sigma)
         typical = self.typical_acceleration(shape.n_expressions)
         return TemporalSmoothness.of(typical, timeline, known, weights, fast, self.fast_limit)
 
     def weight_sigmas(self, names: Sequence[str], n_weights: int) -> np.ndarray:
         """(K,) deviations of K = `n_weights` blend weights about zero; `names` of the shapes, or none."""
-        sigma = np.full(n_weights, float(self.weight_sigma))
-        lids = [k for k, name in enumerate(names) if name.startswith("eyeBlink")]
-        sigma[lids] = max(self.lid_weight_sigma, self.weight_sigma)
-        return sigma
+        return weight_sigmas(names, n_weights, self.weight_sigma, self.lid_weight_sigma)
 
 
 @dataclass(frozen=True)
@@ -194,9 +185,8 @@ class _TakeProblem:
         vectors, self.reference = log_about_mean(rotation)
         values = np.concatenate([vectors, translation, weights], axis=1)
         x = fill_gaps(values, known, piece)
-        self.smoothness = self.settings.smoothness(
-            self.shape, self.timeline, self.seen.valid, x[:, N_POSE:]
-        )
+        known, weights = self.seen.valid, x[:, N_POSE:]
+        self.smoothness = self.settings.smoothness(self.shape, self.timeline, known, weights)
         return x
 
     def _camera_points(self, x: np.ndarray) -> np.ndarray:
