@@ -23,7 +23,6 @@ from vermilion.landmarks.sets import MEDIAPIPE478, LandmarkSet
 from vermilion.storage.errors import InputError
 
 
-
 class MediapipeDetector:
     """Landmarks of each image by itself, so that chunks do not matter.
 
