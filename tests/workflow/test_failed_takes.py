@@ -57,6 +57,20 @@ def test_takes_left_out_by_hand_stay_out_when_others_fail(tmp_path, monkeypatch)
     assert commands[-1][-1] == f"skip_takes={json.dumps(skipped)}"
 
 
+def test_a_take_that_is_alone_ends_the_run(tmp_path, monkeypatch):
+    takes, _ = read_takes(str(ROOT / "config" / "takes.tiny.tsv"))
+
+    def snakemake(words, log, expected_s):
+        failed = tmp_path / "logs" / "landmarks" / f"s1-phone-000000-000007.log{FAILED_SUFFIX}"
+        failed.parent.mkdir(parents=True)  # a second start would fail here
+        failed.write_text("no face")
+        return 1
+
+    monkeypatch.setattr("vermilion.app.run.run_workflow", snakemake)
+    code, skipped = run_all("c.yaml", tmp_path, takes, [], {}, alone=True)
+    assert code == 1 and skipped == {"s1/phone": "landmarks: no face"}
+
+
 @pytest.mark.slow
 def test_a_video_without_a_face_costs_itself(finished, tmp_path):
     """A video of a person of its own shows no face: the run ends without it, and says why."""

@@ -69,8 +69,9 @@ def correct_lips(
         raise InputError("; ".join(problems), "a take sheet", "Report this.")
     configuration = str(Path(results) / "config.yaml")
     code, skipped = run_all(
-        configuration, Path(results), takes, [*options, *_shared()], {}, expected(n_frames, chunk)
-    )
+        configuration, Path(results), takes, [*options, *_shared()], {},
+        expected(n_frames, chunk), alone=True,
+    )  # fmt: skip
     if skipped:
         return code or 1
     pages = sorted(Path(results).glob("apply/*/*/lips.html"))

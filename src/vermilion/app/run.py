@@ -63,11 +63,13 @@ def run_all(
     options: list[str],
     left_out: dict[str, str],
     expected_s: Callable[[str], float] | None = None,
+    alone: bool = False,
 ) -> tuple[int, dict[str, str]]:
     """Run until all but the takes that fail, and those that the configuration leaves out, is made.
 
     Args:
         expected_s: rule -> seconds that one of its jobs takes about.
+        alone: whether a take that fails ends the run, as there is no other.
 
     Returns:
         (exit code of the first run, takes that were left out -> why); raises SystemExit where what
@@ -85,6 +87,8 @@ def run_all(
         if not new:
             raise SystemExit(code)
         skipped |= new
+        if alone:
+            return first, skipped
         print(_sentence("Failed; the run goes on without", new), file=sys.stderr, flush=True)
 
 

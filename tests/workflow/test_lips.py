@@ -1,0 +1,56 @@
+"""What `vermilion lips` runs: a track with contours and its exports, no learning and no measures."""
+
+import json
+import os
+import sys
+
+import numpy as np
+import pytest
+
+from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.imaging.video import write_video
+
+from .conftest import Project
+
+TRACK = {
+    "face_model", "video_facts", "capture", "cameras", "landmarks", "image_identity", "tracking",
+    "tracking_topology", "appearance", "image_fit", "image_fit_join", "tracking_meshes",
+    "contour_detector", "contours", "features", "apply", "apply_export", "quality", "lips_page",
+}  # fmt: skip
+
+
+@pytest.fixture
+def shot(fresh_project, tmp_path):
+    """A project whose configuration is that of a clip with a space and an umlaut in its path."""
+    environment = tmp_path / "landmarks" / "bin"
+    environment.mkdir(parents=True)
+    (environment / "python").symlink_to(sys.executable)  # a dry run does not start it
+    clip = tmp_path / "Größe 1.mp4"
+    write_video(clip, [np.full((64, 48, 3), 90, np.uint8)] * 12, 25.0)
+    results = tmp_path / "out put"
+    write_shot(LipShot(clip, str(results), {"name": "procedural"}))
+    project = Project(fresh_project.folder, str(results / "config.yaml"))
+    place = json.dumps(
+        {"detector": "mediapipe", "mediapipe": {"environment": str(environment.parent)}}
+    )
+    return project, ("--config", f"landmarks={place}")
+
+
+@pytest.mark.slow
+def test_contours_alone_run_nothing_that_learns_or_measures(shot):
+    project, options = shot
+    assert set(project.would_run(*options)) == TRACK
+
+
+@pytest.mark.slow
+def test_a_model_of_another_run_is_an_input_and_nothing_is_trained(shot, tmp_path):
+    project, options = shot
+    model = tmp_path / "MS.h5"
+    model.write_bytes(b"")
+    apply = json.dumps({"model": str(model)})
+    run = project.snakemake("--dry-run", *options, f"apply={apply}")
+    assert f", {model}" in run.stdout + run.stderr
+    assert "rule train" not in run.stdout + run.stderr
+    os.unlink(model)
+    missing = project.snakemake("--dry-run", *options, f"apply={apply}", check=False)
+    assert missing.returncode and str(model) in missing.stdout + missing.stderr
