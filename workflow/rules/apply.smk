@@ -54,6 +54,11 @@ def exports_to(folder, overlay, timeline, category):
         outputs[name] = path if "." in EXPORTED[name] else directory(path)
     if options.topology == "full":
         outputs["full"] = folder + "/full.npy"
+    if options.live_link:
+        outputs["live_link"] = folder + "/live_link.csv"
+    if options.rig:
+        outputs["rig"] = folder + "/rig.csv"
+        outputs["corrective"] = folder + "/rig_corrective.obj"
     if options.plate:
         outputs["plate"] = directory(folder + "/plate")
     if CONFIG.tracking.image_fit.enabled:
@@ -71,8 +76,10 @@ def exports_need(wildcards):
     """What the exported files need beyond the corrected chunks (use with `unpack`)."""
     needed = {"identity": P.identity.format(subject=wildcards.subject)}
     options = CONFIG.apply.export
-    if options.topology == "full":
+    if options.topology == "full" or options.live_link:
         needed["studio"] = P.studio_model
+    if options.rig:
+        needed["rig"] = options.rig
     if options.plate:
         needed["images"] = mono_images(wildcards)
     if CONFIG.tracking.image_fit.enabled:

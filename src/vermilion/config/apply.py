@@ -44,6 +44,17 @@ class ExportConfig(StageConfig):
         description="How far blend shapes may be from the corrected mesh (mm, farthest vertex of the "
         "take). Smaller values need more corrective shapes.",
     )
+    live_link: bool = Field(
+        False,
+        description="Also write `live_link.csv`: ARKit's 52 weights that give the corrected face, as Live "
+        "Link Face writes them, with timecode.",
+    )
+    rig: str | None = Field(
+        None,
+        description="Folder with the blend shapes of your rig: `neutral.obj` and a file a shape, in the "
+        "vertex order of the exported mesh (mm). Its weights of the take are written as `rig.csv`, and what "
+        "it cannot show as one more shape, `rig_corrective.obj`.",
+    )
     plate: bool = Field(
         False,
         description="Also write the take's images without lens distortion (`plate/<frame>.jpg`), and "

@@ -64,14 +64,9 @@ class FullFace:
             identity: (I,) the person's coefficients.
             shapes: the named shapes of the sequence.
         """
-        jaw = _shape_of(full, _JAW)
-        opened = full.neutral_mm + _slight_opening(full, face, jaw) * jaw
-        apart = _APART if _JAW in face.expression_names else 0.0
-        pose = opened + apart * jaw
-        coarse_pose = face.neutral_mm + apart * _shape_of(face, _JAW)
+        opened, pose, coarse_pose = _poses(full, face)
         to_full = _carry(pose, full, coarse_pose, face.triangles)
-        at = Surface(pose, full.triangles).closest(coarse_pose)
-        sample = at.matrix(full.triangles, full.n_vertices)
+        sample = _sample(full, pose, coarse_pose)
         count = min(len(identity), full.n_identities)
         person = opened + np.tensordot(
             identity[:count], full.identities_mm[:count].astype(np.float64), axes=1
@@ -108,6 +103,28 @@ class FullFace:
     def basis(self, coarse: ShapeBasis) -> ShapeBasis:
         """The blend shapes of the coarser mesh on this one."""
         return coarse.on_other_topology(self.carry, self.neutral_mm, self.shapes_mm)
+
+
+def shapes_on_coarse(full: FaceModel, face: FaceModel) -> NamedShapes:
+    """All shapes of the full model on the mesh of `face`, (K, V, 3), without weights (0, K)."""
+    _, pose, coarse_pose = _poses(full, face)
+    sample = _sample(full, pose, coarse_pose)
+    shapes = np.stack([sample @ shape.astype(np.float64) for shape in full.expressions_mm])
+    return NamedShapes(full.expression_names, shapes, np.zeros((0, len(shapes))))
+
+
+def _poses(full: FaceModel, face: FaceModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The full model (W, 3) as open as the coarse one's neutral; both with the lips apart."""
+    jaw = _shape_of(full, _JAW)
+    opened = full.neutral_mm + _slight_opening(full, face, jaw) * jaw
+    apart = _APART if _JAW in face.expression_names else 0.0
+    return opened, opened + apart * jaw, face.neutral_mm + apart * _shape_of(face, _JAW)
+
+
+def _sample(full: FaceModel, pose: np.ndarray, coarse_pose: np.ndarray) -> sparse.csr_matrix:
+    """(V, W): what the full surface has at the vertices of the coarse mesh."""
+    at = Surface(pose, full.triangles).closest(coarse_pose)
+    return at.matrix(full.triangles, full.n_vertices)
 
 
 def _shape_of(model: FaceModel, name: str) -> np.ndarray:

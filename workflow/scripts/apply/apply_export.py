@@ -10,10 +10,13 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.config.apply import ExportConfig
 from vermilion.export.albedo_texture import albedo_texture
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
-from vermilion.export.full_topology import FullFace
+from vermilion.export.full_topology import FullFace, shapes_on_coarse
+from vermilion.export.live_link import write_live_link
+from vermilion.export.objs import write_obj
 from vermilion.export.overlay import join_videos
 from vermilion.export.packages import write_packages
 from vermilion.export.plates import write_plates
+from vermilion.export.rig import read_rig, solve_rig
 from vermilion.export.shape_basis import shape_basis
 from vermilion.export.timeline import draw_timeline
 from vermilion.export.weights import write_weights
@@ -100,6 +103,37 @@ def add_images(snakemake, animation, face, full, options):
     return animation
 
 
+def write_rigs(snakemake, options, coarse, animation, face):
+    """ARKit's weights of the corrected face, and those of the user's rig with its corrective."""
+    inputs, out, fps = snakemake.input, snakemake.output, snakemake.params.fps
+    if options.live_link:
+        shapes = shapes_on_coarse(FaceModel.load(inputs.studio), face)
+        found = solve_rig(coarse, shapes, lips_of(face))
+        print(f"ARKit: {found.left_mm.mean():.3f} mm off over the lips")
+        rotation = coarse.head.rotation[coarse.rows]
+        write_live_link(
+            out.live_link, found.frames, fps, shapes.names, found.shapes.weights, rotation
+        )
+    if options.rig:
+        model = FaceModel.load(inputs.studio) if options.topology == "full" else face
+        rig = read_rig(inputs.rig, model.n_vertices)
+        found = solve_rig(animation, rig, lips_of(model))
+        print(
+            f"rig: {found.left_mm.mean():.3f} mm off over the lips, {found.corrected_mm.mean():.3f} mm "
+            "with the corrective"
+        )
+        names = [*rig.names, "corrective"]
+        weights = np.column_stack([found.shapes.weights, found.corrective])
+        write_weights(out.rig, found.frames, fps, names, weights, np.ones(len(weights), bool))
+        shown = (animation.neutral_mm + found.corrective_mm) / options.unit_mm
+        write_obj(out.corrective, shown, animation.polygons, animation.uv)
+
+
+def lips_of(model):
+    """Vertices (V,) of the vermilion."""
+    return model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+
+
 def main(snakemake):
     inputs, out, fps = snakemake.input, snakemake.output, snakemake.params.fps
     options = ExportConfig(**snakemake.params.cfg["apply.export"])
@@ -119,6 +153,7 @@ def main(snakemake):
     if options.topology == "full":
         studio = FaceModel.load(inputs.studio)
         animation, full = on_full_face(out.full, coarse, face, studio, identity)
+    write_rigs(snakemake, options, coarse, animation, face)
     animation = add_images(snakemake, animation, face, full, options)
 
     def basis():

@@ -1,0 +1,169 @@
+"""Weights of a rig that give the corrected lips, and one corrective shape for what it cannot show.
+
+A rig is a set of blend shapes on the sequence's own mesh. Weights lie in [0, 1], few are used at once,
+and they change smoothly. Of all frames f with displacements d_f from the neutral they minimise
+
+    sum_f |B w_f - d_f|^2 / n + SPARSE sum_f |w_f|_1 + SMOOTH sum_f |w_f - w_(f-1)|^2
+
+over weighted vertices (n: the sum of their weights), by coordinate descent over shapes, odd and even
+frames in turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vermilion.export.animation import Animation, NamedShapes
+from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_polygons
+from vermilion.storage.errors import InputError
+
+SPARSE, SMOOTH = 2e-3, 2e-2  # mm^2 for a weight of 1
+_SWEEPS, _SETTLED = 400, 1e-5
+_LIPS = 6.0  # weight of a vertex of the lips against one of the face
+_NEUTRAL = "neutral"
+
+
+@dataclass(frozen=True)
+class RigWeights:
+    """A rig's weights of a take, and what is left.
+
+    Attributes:
+        frames: (F,) frame numbers with a mesh.
+        shapes: names, shapes (K, V, 3) mm and weights (F, K).
+        corrective_mm: (V, 3) the shape that explains most of what is left.
+        corrective: (F,) its weights, in [0, 1].
+        left_mm: (F,) mean distance over the lips without the corrective; `corrected_mm` with it.
+    """
+
+    frames: np.ndarray
+    shapes: NamedShapes
+    corrective_mm: np.ndarray
+    corrective: np.ndarray
+    left_mm: np.ndarray
+    corrected_mm: np.ndarray
+
+
+def read_rig(folder: str | Path, n_vertices: int) -> NamedShapes:
+    """Read a folder with `neutral.obj` and a file a shape, named after it; millimetres.
+
+    Args:
+        folder: OBJ, PLY files of one topology.
+        n_vertices: of the sequence's mesh, whose vertex order the rig must have.
+
+    Returns:
+        shapes (K, V, 3) as displacements from the rig's neutral, no weights (0, K).
+
+    Raises:
+        InputError: no neutral, no shape, or another number of vertices.
+    """
+    folder = Path(folder)
+    paths = {p.stem: p for p in sorted(folder.glob("*")) if p.suffix.lower() in MESH_SUFFIXES}
+    neutral = paths.pop(_NEUTRAL, None)
+    if neutral is None or not paths:
+        raise InputError(
+            f"{len(paths)} shapes and {'a' if neutral else 'no'} neutral",
+            "neutral.obj (or .ply) and a file a shape",
+            "Export the rig's neutral and each shape at weight 1.",
+            path=folder,
+        )
+    rest = _vertices(neutral, n_vertices)
+    shapes = np.stack([_vertices(path, n_vertices) - rest for path in paths.values()])
+    return NamedShapes(tuple(paths), shapes, np.zeros((0, len(paths))))
+
+
+def _vertices(path: Path, n_vertices: int) -> np.ndarray:
+    vertices, _ = read_polygons(path)
+    if len(vertices) != n_vertices:
+        raise InputError(
+            f"{len(vertices)} vertices",
+            f"{n_vertices}, those of the exported mesh in its order",
+            "Transfer the rig to that mesh (mesh.ply), or set `apply.export.topology`.",
+            path=path,
+        )
+    return vertices
+
+
+def solve_rig(animation: Animation, rig: NamedShapes, lips: np.ndarray) -> RigWeights:
+    """Weights of a rig for the frames of an animation that have a mesh.
+
+    Args:
+        animation: of V vertices; its neutral is the rig's at weight 0.
+        rig: shapes (K, V, 3), head frame.
+        lips: (V,) bool, vertices of the vermilion.
+
+    Returns:
+        weights and corrective.
+    """
+    rows = animation.rows
+    moved = np.empty((len(rows), len(lips), 3), dtype=np.float32)
+    for index, row in enumerate(rows):
+        world = np.asarray(animation.vertices_mm[row], dtype=np.float64)
+        moved[index] = animation.head.to_head(row, world) - animation.neutral_mm
+    trust = np.where(lips, _LIPS, 1.0)
+    shapes = np.asarray(rig.shapes_mm, dtype=np.float64)
+    scaled = shapes * (trust / trust.sum())[:, None]
+    flat = scaled.reshape(len(shapes), -1)
+    gram = flat @ shapes.reshape(len(shapes), -1).T
+    target = moved.reshape(len(rows), -1) @ flat.T
+    weights = bounded_weights(gram, target)
+    rest = moved - np.tensordot(weights, shapes, axes=1)
+    corrective_mm, corrective = _one_shape(rest, trust)
+    after = rest[:, lips] - corrective[:, None, None] * corrective_mm[lips]
+    return RigWeights(
+        animation.frames[rows], replace(rig, weights=weights), corrective_mm, corrective,
+        np.linalg.norm(rest[:, lips], axis=2).mean(axis=1),
+        np.linalg.norm(after, axis=2).mean(axis=1),
+    )  # fmt: skip
+
+
+def bounded_weights(
+    gram: np.ndarray, target: np.ndarray, sparse: float = SPARSE, smooth: float = SMOOTH
+) -> np.ndarray:
+    """Weights (F, K) in [0, 1] that minimise the energy of this module.
+
+    Args:
+        gram: (K, K) products of the shapes.
+        target: (F, K) products of the shapes with each frame.
+        sparse, smooth: mm^2 for a weight of 1.
+    """
+    count, n_shapes = target.shape
+    weights = np.zeros((count, n_shapes))
+    parities = [np.arange(start, count, 2) for start in (0, 1)]
+    neighbours = np.full(count, 2.0)
+    neighbours[[0, -1]] -= 1.0
+    if count == 1:
+        neighbours[:] = 0.0
+    for _ in range(_SWEEPS):
+        largest = 0.0
+        for k in range(n_shapes):
+            for rows in parities:
+                if not len(rows):
+                    continue
+                beside = np.zeros(len(rows))
+                beside[rows > 0] += weights[rows[rows > 0] - 1, k]
+                beside[rows < count - 1] += weights[rows[rows < count - 1] + 1, k]
+                others = weights[rows] @ gram[k] - weights[rows, k] * gram[k, k]
+                high = target[rows, k] - others - 0.5 * sparse + smooth * beside
+                step = gram[k, k] + smooth * neighbours[rows]
+                new = np.clip(high / np.maximum(step, 1e-12), 0.0, 1.0)
+                largest = max(largest, float(np.abs(new - weights[rows, k]).max()))
+                weights[rows, k] = new
+        if largest < _SETTLED:
+            break
+    return weights
+
+
+def _one_shape(rest: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The shape (V, 3) and weights (F,) in [0, 1] whose product is nearest to `rest` (F, V, 3)."""
+    scale = np.sqrt(trust)[:, None]
+    flat = (rest * scale).reshape(len(rest), -1).astype(np.float64)
+    weights = np.ones(len(flat))
+    for _ in range(50):
+        shape = weights @ flat / max(float(weights @ weights), 1e-12)
+        weights = np.maximum(flat @ shape / max(float(shape @ shape), 1e-12), 0.0)
+    top = max(float(weights.max(initial=0.0)), 1e-12)
+    found = (shape * top).reshape(-1, 3) / scale
+    return found, weights / top

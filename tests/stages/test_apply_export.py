@@ -1,0 +1,145 @@
+"""The files of a corrected take: every format, on the tracker's mesh and on the full face."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.stages.run_script import run_script
+from vermilion.appearance.estimate import Appearance
+from vermilion.config.apply import ExportConfig
+from vermilion.export.objs import write_obj
+from vermilion.faces import procedural
+from vermilion.geometry.camera import Camera, look_at
+from vermilion.geometry.mesh_files import read_polygons
+from vermilion.imaging.images import write_srgb8
+from vermilion.imaging.video import write_video
+from vermilion.storage.quality import QualityRow, write_quality
+from vermilion.storage.sequences import write_sequence
+from vermilion.tracking.external.read import read_tracked
+from vermilion.tracking.result import Identity, TrackedTake
+
+pytestmark = pytest.mark.slow
+
+FRAMES, CHUNKS = np.arange(20, 26), ("000020-000022", "000023-000025")
+FIGURES = {"novelty": 0.1, "novelty_limit": 1.0, "largest_correction_mm": 1.5}
+FILES = {
+    "usd": "corrected.usdc", "usd_shapes": "corrected_shapes.usdc", "gltf": "corrected.glb",
+    "obj": "obj", "ply": "ply",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """A tracked and corrected take of the embedded model on disk; its corrected meshes (6, V, 3)."""
+    root = tmp_path_factory.mktemp("take")
+    studio, tracker = procedural.studio_model(n_identities=3), procedural.tracker_model(3000, 3)
+    studio.save(root / "studio.npz")
+    tracker.save(root / "tracker.npz")
+    pose = look_at(np.array([0.0, 0, 700]), np.array([0.0, 0, 40]), np.array([0.0, 1, 0]))
+    lens = (700.0, 690.0, 165.0, 118.0, -0.05, 0.01, 0.0, 0.0)
+    camera = Camera("cam", "OPENCV", lens, 320, 240, pose)
+    weights = np.zeros((6, tracker.n_expressions))
+    weights[:, tracker.expression_names.index("jawOpen")] = np.linspace(0.1, 0.6, 6)
+    turn = Rotation.from_euler("y", np.arange(6.0)[:, None], degrees=True).as_matrix()
+    fit = TrackedTake(
+        FRAMES, weights, np.array(tracker.expression_names), turn, np.zeros((6, 3)),
+        np.ones(6, bool), np.zeros(6), np.array(camera.name), np.array(camera.model),
+        np.array(camera.params), np.array([320, 240]), camera.cam_from_world,
+    )  # fmt: skip
+    fit.save(root / "fit.npz")
+    identity = np.array([0.5, -0.5, 0.2])
+    neutral = tracker.neutral_of(identity)
+    person = Identity(
+        identity, neutral, np.zeros((66, 3)), np.array(["t"]), np.ones(1), np.ones(1, bool)
+    )
+    person.save(root / "identity.npz")
+    lips = tracker.regions["vermilion_lower"]
+    local = tracker.vertices(identity, weights)
+    local[:, lips, 2] += 1.5
+    corrected = (local @ np.swapaxes(turn, 1, 2)).astype(np.float32)
+    triangle = np.arange(len(tracker.triangles), dtype=np.int32)
+    albedo = np.tile(np.array([0.5, 0.3, 0.2]), (1, len(triangle), 1))
+    Appearance(
+        FRAMES, triangle, np.full((len(triangle), 3), 1 / 3), np.zeros((9, 3)), albedo,
+        np.zeros(len(triangle)), np.ones(len(triangle)),
+    ).save(root / "appearance.npz")  # fmt: skip
+    for chunk, rows in zip(CHUNKS, (slice(0, 3), slice(3, 6)), strict=True):
+        write_sequence(root / f"{chunk}.npy", corrected[rows])
+        write_video(root / f"{chunk}.mp4", [np.full((48, 64, 3), 90, np.uint8)] * 3, 25.0)
+        rows_of_quality = [
+            QualityRow(int(frame), True, "", dict(FIGURES)) for frame in FRAMES[rows]
+        ]
+        write_quality(root / f"{chunk}.tsv", "s1", "t", "apply", rows_of_quality)
+    for frame in FRAMES[:-1]:  # the last image is missing
+        write_srgb8(root / f"images/{frame:06d}.png", np.full((240, 320, 3), 100, np.uint8))
+    for name, shape in (("neutral", 0.0), ("open", tracker.expressions_mm[0])):
+        write_obj(root / f"rig/{name}.obj", tracker.neutral_mm + shape, tracker.triangles)
+    return root, studio, tracker, corrected
+
+
+def export(root, out, options):
+    names = {
+        "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
+        "overlay": "overlay.mp4", "timeline": "timeline.png", "full": "full.npy",
+        "plate": "plate", "albedo": "albedo.png", "live_link": "live_link.csv", "rig": "rig.csv",
+        "corrective": "rig_corrective.obj", **FILES,
+    }  # fmt: skip
+    run_script(
+        "apply/apply_export",
+        wildcards={"subject": "s1", "take": "t"},
+        params={
+            "cfg": {"apply.export": options.model_dump()}, "fps": 25.0,
+            "source": str(root / "images"),
+        },
+        input={
+            **{name: root / f"{name}.npz" for name in ("tracker", "studio", "fit", "identity")},
+            "appearance": root / "appearance.npz",
+            "rig": root / "rig",
+            "corrected": [root / f"{chunk}.npy" for chunk in CHUNKS],
+            "overlays": [root / f"{chunk}.mp4" for chunk in CHUNKS],
+            "quality": [root / f"{chunk}.tsv" for chunk in CHUNKS],
+        },
+        output={name: out / file for name, file in names.items()},
+    )  # fmt: skip
+
+
+def test_every_format_of_the_trackers_mesh_is_the_corrected_take(take, tmp_path):
+    root, _, tracker, corrected = take
+    options = ExportConfig(
+        formats=list(FILES), plate=True, live_link=True, rig=str(root / "rig"), unit_mm=10.0
+    )
+    export(root, tmp_path, options)
+    for name, file in FILES.items():
+        limit = options.tolerance_mm + 1e-3 if name in ("usd_shapes", "gltf") else 2e-4
+        back = read_tracked(tmp_path / file, FRAMES)
+        assert np.linalg.norm(back.vertices_mm - corrected, axis=2).max() < limit, file
+        assert np.array_equal(back.triangles, tracker.triangles), file
+    assert len(list((tmp_path / "plate").glob("*.jpg"))) == 5
+    table = pd.read_csv(tmp_path / "live_link.csv")
+    assert table["Timecode"].iloc[0] == "00:00:00:20.000"
+    assert np.all(np.diff(table["JawOpen"]) > 0)
+    rig = pd.read_csv(tmp_path / "rig.csv")
+    assert rig.columns.tolist() == ["frame", "time_s", "valid", "open", "corrective"]
+    assert read_polygons(tmp_path / "rig_corrective.obj")[0].shape == (tracker.n_vertices, 3)
+    texture = cv2.imread(str(tmp_path / "albedo.png"))
+    assert texture.shape == (1024, 1024, 3)
+    assert np.ptp(texture.reshape(-1, 3), axis=0).max() <= 1  # one albedo everywhere
+
+
+def test_the_full_face_has_the_corrected_lips_and_its_own_topology(take, tmp_path):
+    root, studio, tracker, corrected = take
+    export(root, tmp_path, ExportConfig(formats=["usd", "usd_shapes", "gltf"], topology="full"))
+    whole = np.load(tmp_path / "full.npy")
+    assert whole.shape == (6, studio.n_vertices, 3)
+    for name in ("usd", "usd_shapes", "gltf"):
+        back = read_tracked(tmp_path / FILES[name], FRAMES)
+        assert np.linalg.norm(back.vertices_mm - whole, axis=2).max() < 0.03
+    lips = [model.regions["vermilion_lower"] for model in (studio, tracker)]
+    means = [
+        mesh[:, mask].mean(axis=1) for mesh, mask in zip((whole, corrected), lips, strict=True)
+    ]
+    assert np.abs(means[0] - means[1]).max() < 1.0

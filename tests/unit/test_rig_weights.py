@@ -1,0 +1,137 @@
+"""Weights of rigs: what is found for shapes that are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.unit.exported import animated_head
+from vermilion.export.animation import NamedShapes
+from vermilion.export.live_link import SHAPES, arkit_column, timecode, write_live_link
+from vermilion.export.objs import write_obj
+from vermilion.export.rig import bounded_weights, read_rig, solve_rig
+from vermilion.storage.errors import InputError
+from vermilion.studio.live_link import read_live_link
+
+COUNT = 30
+
+
+def rig(n_vertices: int, near: np.ndarray) -> NamedShapes:
+    """Eight smooth shapes of the mouth."""
+    rng = np.random.default_rng(1)
+    waves = np.sin(near[:, :2] @ rng.normal(0, 0.15, (2, 8)) + rng.uniform(0, 6, 8))
+    fade = np.exp(-(near**2).sum(axis=1) / 1500)
+    shapes = np.stack([fade[:, None] * waves[:, k, None] * rng.normal(0, 4, 3) for k in range(8)])
+    return NamedShapes(tuple(f"shape{k}" for k in range(8)), shapes, np.zeros((0, 8)))
+
+
+def shown(weights, extra=0.0):
+    """A turning head that shows the rig at known weights, and its rig and lips."""
+    head = animated_head(np.arange(COUNT))
+    own = rig(len(head.neutral_mm), head.neutral_mm * [1, 1, 0])
+    local = head.neutral_mm + np.tensordot(weights, own.shapes_mm, axes=1) + extra
+    world = np.stack([head.head.to_world(row, mesh) for row, mesh in enumerate(local)])
+    lips = (np.abs(head.neutral_mm[:, 1]) < 9) & (np.abs(head.neutral_mm[:, 0]) < 22)
+    return replace(head, vertices_mm=world.astype(np.float32)), own, lips
+
+
+def smooth_weights():
+    time = np.arange(COUNT)[:, None] / 25
+    phase = np.random.default_rng(2).uniform(0, 6, 8)
+    return np.clip(0.5 + 0.6 * np.sin(5 * time + phase), 0, 1) * [1, 1, 0, 1, 0, 0, 1, 0]
+
+
+def test_weights_that_a_rig_has_shown_are_found_again():
+    true = smooth_weights()
+    animation, own, lips = shown(true)
+    found = solve_rig(animation, own, lips)
+    assert np.abs(found.shapes.weights - true).mean() < 0.04
+    assert found.left_mm.mean() < 0.3
+    # Shapes that were not used stay unused.
+    assert found.shapes.weights[:, [2, 4, 5, 7]].mean() < 0.03
+
+
+def test_one_corrective_shows_what_the_rig_cannot():
+    """Lips that one shape outside the rig moves, as in a shot whose actor has it."""
+    head = animated_head(np.arange(COUNT))
+    near = np.exp(-(head.neutral_mm[:, :2] ** 2).sum(axis=1) / 120)
+    outside = near[:, None] * [0.0, 0.5, 3.0]
+    drive = 0.5 + 0.5 * np.sin(np.arange(COUNT) / 4)
+    animation, own, lips = shown(smooth_weights(), drive[:, None, None] * outside)
+    found = solve_rig(animation, own, lips)
+    assert found.left_mm.mean() > 0.4
+    assert found.corrected_mm.mean() < 0.3
+    assert found.corrective.min() >= 0.0
+    assert found.corrective.max() == pytest.approx(1.0)
+
+
+def test_weights_minimise_the_energy_within_their_bounds():
+    rng = np.random.default_rng(0)
+    shapes = rng.normal(0, 1, (5, 30))
+    gram, goal = shapes @ shapes.T, rng.normal(0, 1, (7, 30))
+    target, sparse, smooth = goal @ shapes.T, 0.3, 0.7
+    found = bounded_weights(gram, target, sparse, smooth)
+
+    def energy(weights):
+        steps = np.diff(weights, axis=0)
+        return (
+            ((weights @ shapes - goal) ** 2).sum()
+            + sparse * weights.sum()
+            + smooth * (steps**2).sum()
+        )
+
+    assert found.min() >= 0.0
+    assert found.max() <= 1.0
+    for _ in range(300):
+        other = np.clip(found + rng.normal(0, 0.05, found.shape), 0, 1)
+        assert energy(other) >= energy(found) - 1e-9
+
+
+def test_a_rig_is_read_from_a_folder_and_another_topology_is_named(tmp_path):
+    head = animated_head()
+    own = rig(len(head.neutral_mm), head.neutral_mm)
+    write_obj(tmp_path / "neutral.obj", head.neutral_mm, head.polygons)
+    for name, shape in zip(own.names, own.shapes_mm, strict=True):
+        write_obj(tmp_path / f"{name}.obj", head.neutral_mm + shape, head.polygons)
+    found = read_rig(tmp_path, len(head.neutral_mm))
+    assert found.names == own.names
+    assert np.abs(found.shapes_mm - own.shapes_mm).max() < 1e-4
+    with pytest.raises(InputError, match=r"neutral\.obj: found 970 vertices; expected 12,"):
+        read_rig(tmp_path, 12)
+    (tmp_path / "neutral.obj").unlink()
+    with pytest.raises(InputError, match="found 8 shapes and no neutral"):
+        read_rig(tmp_path, 12)
+
+
+def test_live_link_reads_back_what_was_written(tmp_path):
+    names = ("jawOpen", "mouthSmile_L", "browInnerUp_L", "browInnerUp_R", "notInArkit")
+    weights = np.random.default_rng(0).random((12, 5))
+    weights[:, 3] = weights[:, 2]
+    frames = np.arange(90, 102)
+    turn = np.tile(np.eye(3), (12, 1, 1))
+    write_live_link(tmp_path / "a.csv", frames, 30.0, names, weights, turn)
+    back = read_live_link(tmp_path / "a.csv", names, 12, 30.0)
+    assert np.abs(back[:, :4] - weights[:, :4]).max() < 1e-9
+    table = pd.read_csv(tmp_path / "a.csv")
+    assert len(table.columns) == 2 + 61
+    assert (table["BlendShapeCount"] == 61).all()
+    assert table["Timecode"].iloc[0] == "00:00:03:00.000"
+    assert table["Timecode"].iloc[-1] == "00:00:03:11.000"
+
+
+def test_the_52_shapes_have_their_names():
+    assert len(SHAPES) == len(set(SHAPES)) == 52
+    assert arkit_column("eyeBlink_L") == "EyeBlinkLeft"
+    assert arkit_column("mouthLeft") == "MouthLeft"
+    assert arkit_column("cheekPuff_R") == "CheekPuff"
+    assert arkit_column("neckTense") is None
+    assert timecode(25 * 3661 + 7, 25.0) == "01:01:01:07.000"
+
+
+def test_columns_stand_in_the_order_of_a_recording(data_root):
+    recording = next((data_root / "performance").glob("*.csv"))
+    columns = pd.read_csv(recording, nrows=1).columns
+    assert tuple(columns[2:54]) == SHAPES
