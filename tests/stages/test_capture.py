@@ -72,6 +72,7 @@ def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
             },
             "camera": "mid",
             "frames": [0, 2],
+            "focal": None,
         },
         input={"manifests": manifests},
         output={

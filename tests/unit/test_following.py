@@ -168,6 +168,10 @@ def test_the_take_sheet_may_say_which_face(tmp_path):
     row = "a\tt\tvideo\tx.mp4\t0\t9\t25\tnone\t"
     sheet.write_text(header + row + "640, 200\n")
     assert read_takes(sheet)[0][0].face == (640.0, 200.0)
+    sheet.write_text(header.replace("face", "focal") + row + "0.83\n")
+    assert read_takes(sheet)[0][0].focal == 0.83
+    sheet.write_text(header.replace("face", "focal") + row + "28mm\n")
+    assert "focal: found '28mm'" in read_takes(sheet)[1][0]
     for wrong in ("1,2,3", "left", "10,10,5,20"):
         sheet.write_text(header + row + wrong + "\n")
         takes, problems = read_takes(sheet)

@@ -117,5 +117,9 @@ def test_one_camera_gets_an_assumed_focal_and_several_an_error(tmp_path):
     )
     assert rig.summary()["calibrated"] is False and rig.method == "assumed"
     assert rig.cameras["cam"].params[:2] == (1536.0, 1536.0)
+    upright = rig_cameras(tmp_path, {"cam": (720, 1280)}, "cam", board)
+    assert upright.cameras["cam"].params[:2] == (1536.0, 1536.0)  # the same lens
+    known = rig_cameras(tmp_path, {"cam": (720, 1280)}, "cam", board, focal=0.8)
+    assert known.summary()["calibrated"] and known.cameras["cam"].params[0] == 1024.0
     with pytest.raises(InputError, match=r"2 cameras without a calibration.*cameras/"):
         rig_cameras(tmp_path, {"a": (8, 8), "b": (8, 8)}, "a", board)

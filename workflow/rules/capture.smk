@@ -127,5 +127,6 @@ rule cameras:
         code=code_of("capture/cameras"),
         camera=mono_camera,
         frames=take_span,
+        focal=lambda wildcards: take_of(wildcards).focal,
     script:
         "../scripts/capture/cameras.py"

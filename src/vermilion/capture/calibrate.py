@@ -33,7 +33,7 @@ class CalibrationSettings:
         camera_model: COLMAP model, `PINHOLE` or `OPENCV` (two radial, two tangential terms).
         refine_principal_point: whether it is estimated, or stays at the middle of the image.
         max_view_px: views with a larger RMS after the first adjustment are dropped once.
-        assumed_focal: focal length of a single camera without calibration, in image widths.
+        assumed_focal: focal length of a single camera without calibration, in lengths of the longer side.
     """
 
     camera_model: str = "OPENCV"

@@ -27,7 +27,7 @@ class RigCameras:
 
     Attributes:
         cameras: name -> camera.
-        method: `given`, `charuco`, `checkerboard` or `assumed`.
+        method: `given`, `charuco`, `checkerboard`, `sheet` (a known focal length) or `assumed`.
         calibration: the calibration from a board, if there was one.
     """
 
@@ -76,6 +76,7 @@ def rig_cameras(
     reference: str,
     board: Board,
     settings: CalibrationSettings | None = None,
+    focal: float | None = None,
     **place: Any,
 ) -> RigCameras:
     """Cameras of a take: read from `cameras/`, else calibrated from `calibration/`, else assumed.
@@ -86,6 +87,7 @@ def rig_cameras(
         reference: camera whose frame becomes the world of a calibrated rig.
         board: the calibration board.
         settings: how cameras are calibrated.
+        focal: known focal length of a single camera, in lengths of the image's longer side; None: assumed.
         place: subject and take, for error messages.
 
     Raises:
@@ -110,8 +112,10 @@ def rig_cameras(
         return RigCameras(made.cameras, board.kind, made)
     if len(sizes) == 1:
         name, (width, height) = next(iter(sizes.items()))
-        focal = settings.assumed_focal * width
-        return RigCameras({name: pinhole(name, focal, width, height)}, "assumed")
+        # Of the longer side, so that a lens is the same upright and across.
+        focal_px = (focal or settings.assumed_focal) * max(width, height)
+        made_of = "sheet" if focal else "assumed"
+        return RigCameras({name: pinhole(name, focal_px, width, height)}, made_of)
     raise InputError(
         f"{len(sizes)} cameras without a calibration",
         "cameras/ (COLMAP, Metashape, OpenCV, USD, ...) or calibration/<camera>/ (views of a board)",

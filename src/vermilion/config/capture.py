@@ -56,7 +56,8 @@ class CalibrationConfig(StageConfig):
         1.2,
         ge=0.3,
         le=10,
-        description="Focal length of a single camera without calibration (image widths).",
+        description="Focal length of a single camera without calibration, for takes whose row of the take sheet "
+        "has nothing in its column `focal` (lengths of the image's longer side; a full-frame lens of 43 mm is 1.2).",
     )
 
     @field_validator("squares")

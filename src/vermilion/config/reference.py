@@ -55,6 +55,12 @@ def take_sheet_schema() -> dict[str, Any]:
             "description": "Which of several faces is followed: nothing (the largest), `x,y` (the nearest) "
             "or `left,top,right,bottom` (the largest in a box), pixels. The column may be left out.",
         },
+        "focal": {
+            "anyOf": [{"type": "number", "minimum": 0.3, "maximum": 10}, {"const": ""}],
+            "description": "Known focal length of a single camera without calibration, over the length of the "
+            "image's longer side (millimetres of a full-frame lens over 36). Empty: estimated. The column may "
+            "be left out.",
+        },
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

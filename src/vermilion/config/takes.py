@@ -16,7 +16,7 @@ from vermilion.storage.errors import InputError
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
 #: Columns that may be left out.
-OPTIONAL_COLUMNS = ("face",)
+OPTIONAL_COLUMNS = ("face", "focal")
 #: What a split may be.
 SPLIT = r"train|test|none|test:\d+-\d+(,\d+-\d+)*"
 #: `source` of a take that the studio makes.
@@ -37,6 +37,7 @@ class Take:
         split: `train`, `test`, `none`, or `test:A-B,C-D` (these stretches of frames are held out, the
             rest trains).
         face: which of several faces is followed: none, (x, y) or (left, top, right, bottom), pixels.
+        focal: known focal length of a single camera, in lengths of the image's longer side; None: not known.
     """
 
     subject: str
@@ -48,6 +49,7 @@ class Take:
     fps: float
     split: str
     face: tuple[float, ...] = ()
+    focal: float | None = None
 
     @property
     def name(self) -> str:
@@ -150,7 +152,8 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
     split = value["split"] or "none"
     wrong += _split_problems(split, numbers)
     face, reason = _face(value["face"])
-    wrong += [reason] if reason else []
+    focal, reason_of_focal = _focal(value["focal"])
+    wrong += [text for text in (reason, reason_of_focal) if text]
     if wrong:
         return None, wrong
     take = Take(
@@ -163,6 +166,7 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         numbers["fps"],
         split,
         face,
+        focal,
     )
     return take, []
 
@@ -191,6 +195,20 @@ def _face(text: str) -> tuple[tuple[float, ...], str]:
     except ValueError:
         return (), f"face: found '{text}'; expected numbers separated by commas, or nothing."
     return tuple(numbers), face_problem(numbers)
+
+
+def _focal(text: str) -> tuple[float | None, str]:
+    """The number of the column `focal`, and a sentence where it is none."""
+    try:
+        focal = float(text) if text else None
+    except ValueError:
+        focal = math.nan
+    if focal is None or 0.3 <= focal <= 10:
+        return focal, ""
+    return None, (
+        f"focal: found '{text}'; expected the focal length over the length of the image's longer side, "
+        "0.3 to 10 (millimetres of a full-frame lens over 36), or nothing."
+    )
 
 
 def face_problem(numbers: Sequence[float]) -> str:

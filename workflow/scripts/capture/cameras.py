@@ -108,6 +108,7 @@ def main(snakemake):
         snakemake.params.camera,
         board,
         settings_from(CalibrationSettings, cfg),
+        focal=snakemake.params.focal,
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )

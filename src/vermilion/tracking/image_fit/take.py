@@ -19,8 +19,14 @@ from vermilion.tracking.image_fit.frame_fit import FrameProblem, FrameView, visi
 from vermilion.tracking.image_fit.image_levels import image_pyramid
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.expression import N_POSE, LandmarkFitSettings
-from vermilion.tracking.landmark_fit.observation import Observations, focal_px, project
+from vermilion.tracking.landmark_fit.observation import (
+    Observations,
+    focal_px,
+    project,
+    reprojection_px,
+)
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
+from vermilion.tracking.landmark_fit.turned import as_seen_turned, turned_frames
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import landmark_fit_settings
 
@@ -44,7 +50,7 @@ class TakeStart:
         camera: of the images, with the focal length that was used.
         x: (F, 6 + K) the landmark fit: rotation vector about `reference`, translation, weights.
         reference: (3, 3) rotation, the mean of the whole take.
-        seen: landmarks of the F frames.
+        seen: landmarks of the F frames, without what turned heads hide.
         settings: of the landmark fit.
     """
 
@@ -77,7 +83,12 @@ class TakeStart:
         place = {int(frame): row for row, frame in enumerate(track.frames)}
         order = np.array([place[int(frame)] for frame in fit.frames[rows]], dtype=int)
         seen = Observations.of(track, camera)[order]
-        return cls(model, identity, camera, x[rows], reference, seen, settings)
+        start = cls(model, identity, camera, x[rows], reference, seen, settings)
+        turned = turned_frames(rotation[rows], translation[rows])
+        visible = as_seen_turned(
+            seen, model, lambda row: start.vertices(start.x[row]), turned, focal_px(camera)
+        )
+        return replace(start, seen=visible)
 
     @classmethod
     def load(
@@ -124,14 +135,13 @@ class TakeStart:
         to_world = self.camera.rotation.T
         shape = self.landmark_shape()
         points = shape.points(x[:, N_POSE:]) @ np.swapaxes(rotation, 1, 2) + x[:, None, 3:6]
-        squared = ((project(points, focal_px(self.camera)) - self.seen.image) ** 2).sum(axis=-1)
-        error = np.sqrt(squared[:, self.seen.landmark_set.compared].mean(axis=1))
+        error = reprojection_px(project(points, focal_px(self.camera)), self.seen)
         return replace(
             fit,
             weights=x[:, N_POSE:],
             world_from_head_rotation=to_world @ rotation,
             world_from_head_translation_mm=(x[:, 3:6] - self.camera.translation) @ to_world.T,
-            reprojection_px=np.where(self.seen.valid, error, np.nan),
+            reprojection_px=error,
         )
 
     def landmark_shape(self) -> LandmarkShape:

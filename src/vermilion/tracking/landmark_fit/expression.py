@@ -24,6 +24,7 @@ from vermilion.tracking.landmark_fit.observation import (
     pose_jacobian,
     project,
     projection_jacobian,
+    reprojection_px,
     require_landmarks,
     robust_cost,
     robust_weights,
@@ -230,8 +231,7 @@ class _TakeProblem:
     def motion(self, x: np.ndarray) -> HeadMotion:
         """Pose and expression of the state x (F, 6 + K)."""
         image = project(self._camera_points(x), self.focal)
-        squared = ((image - self.seen.image) ** 2).sum(axis=-1)[:, self.seen.landmark_set.compared]
-        reprojection = np.where(self.seen.valid, np.sqrt(squared.mean(axis=1)), np.nan)
+        reprojection = reprojection_px(image, self.seen)
         rotation = exp_about_mean(x[:, :3], self.reference)
         return HeadMotion(rotation, x[:, 3:6].copy(), x[:, N_POSE:].copy(), reprojection)
 

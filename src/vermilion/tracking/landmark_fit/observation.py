@@ -69,6 +69,18 @@ class Observations:
         )
 
 
+def reprojection_px(image: np.ndarray, seen: Observations) -> np.ndarray:
+    """RMS distance (F,) of landmarks in `image` (F, N, 2) from those seen; NaN where there are none.
+
+    Over all landmarks except the jaw's, and those that are hidden.
+    """
+    compared = seen.landmark_set.compared
+    squared = ((image - seen.image) ** 2).sum(axis=-1)[:, compared]
+    counts = (seen.trust > 0)[:, compared]
+    total = (counts * squared).sum(axis=1) / np.maximum(counts.sum(axis=1), 1)
+    return np.where(seen.valid, np.sqrt(total), np.nan)
+
+
 def require_landmarks(takes: Sequence[Observations]) -> None:
     """Raise InputError where no frame of any take has landmarks."""
     if not any(seen.valid.any() for seen in takes):
