@@ -1,11 +1,14 @@
 """A folder in which the sketch page can open a take: a generated mouth, its track, its images.
 
-Nothing of the workflow has run there; the files of its results are written as the stages write them.
+Nothing of the workflow has run there; the files of its results are written as the stages write them, so
+that only the stage `guided` is left to run.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +31,7 @@ from vermilion.tracking.result import Identity, TrackedTake
 ROOT = Path(__file__).resolve().parents[1]
 N_FRAMES, CAMERA, TAKE = 6, "cam", "s/t"
 SUGGESTED, LOST = (4, 1), 3
+CHUNK = f"000000-{N_FRAMES - 1:06d}"
 SKIN, RED = (0.80, 0.62, 0.52), (0.66, 0.30, 0.30)
 
 
@@ -79,7 +83,11 @@ def make_take(folder: Path, rendered: bool = False) -> SketchTake:
         taken / "tracking" / "fit.npz"
     )
     write_cameras(taken / "cameras", {CAMERA: camera})
-    write_sequence(taken / "tracking" / "C" / f"000000-{N_FRAMES - 1:06d}.npy", base)
+    write_sequence(taken / "tracking" / "C" / f"{CHUNK}.npy", base)
+    # Jobs of earlier stages ask for these; no job of the stage `guided` opens them.
+    for name in (f"capture/{CHUNK}.json", "capture/cameras.json", f"landmarks/{CHUNK}.npz"):
+        (taken / name).parent.mkdir(exist_ok=True)
+        (taken / name).touch()
     rows = [{"rank": k + 1, "frame": f, "unexplained_after": 0.1} for k, f in enumerate(SUGGESTED)]
     write_table(taken / "guided" / "suggestions.tsv", pd.DataFrame(rows))
     colours = np.where(
@@ -91,7 +99,11 @@ def make_take(folder: Path, rendered: bool = False) -> SketchTake:
         if rendered:
             image = draw_mesh(empty, camera, true[frame], face.triangles, colours)
         write_srgb8(folder / "capture" / "frames" / CAMERA / f"{frame:06d}.png", image)
-        write_ridges(taken / "contours" / "000000-000005" / f"{frame:06d}.exr", true[frame])
+        write_ridges(taken / "contours" / CHUNK / f"{frame:06d}.exr", true[frame])
+    # All of one age: nothing is newer than what was made from it.
+    now = time.time()
+    for path in [*results.rglob("*"), *(folder / "capture").rglob("*")]:
+        os.utime(path, (now, now))
     return SketchTake(folder, true, base)
 
 
@@ -111,13 +123,23 @@ def write_ridges(path: Path, mesh_mm: np.ndarray) -> None:
 
 
 def _write_configuration(folder: Path) -> None:
+    """The workflow, a configuration and a sheet; the rig takes are never made, but the rules ask for some."""
     folder.mkdir(parents=True, exist_ok=True)
     content = {
         "results": "results/take", "takes": "takes.tsv", "face_model": {"name": "procedural"},
+        "studio": {"subjects": {"rig": {"seed": 1, "takes": {"rom": {"seed": 1}}}}},
+        "tracking": {"image_fit": {"enabled": False}},
         "guided": {"takes": {TAKE: "base"}},
     }  # fmt: skip
     (folder / "take.yaml").write_text(yaml.safe_dump(content))
-    header = "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit"
-    row = f"s\tt\tvideo\tcapture\t0\t{N_FRAMES - 1}\t30\tnone"
-    (folder / "takes.tsv").write_text(f"{header}\n{row}\n")
-    shutil.copytree(ROOT / "workflow" / "rules", folder / "workflow" / "rules", dirs_exist_ok=True)
+    rows = [
+        "subject take role source first last fps split",
+        "rig plain plain studio 0 0 30 none",
+        "rig rom tattoo studio 0 9 30 test:6-9",
+        f"s t video capture 0 {N_FRAMES - 1} 30 none",
+    ]
+    (folder / "takes.tsv").write_text("\n".join(row.replace(" ", "\t") for row in rows) + "\n")
+    shutil.copy(ROOT / "Snakefile", folder)
+    for name in ("workflow", "profiles"):
+        unwanted = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, folder / name, ignore=unwanted)

@@ -49,7 +49,7 @@ def gate(desk):
 
 
 @pytest.fixture
-def stranger(gate):
+def visitor(gate):
     """A client that has no cookie yet."""
     return TestClient(gate, base_url=ADDRESS, follow_redirects=False)
 
@@ -91,24 +91,22 @@ def drawn(take, frame):
 # Closed --------------------------------------------------------------------------------------------
 
 
-def test_without_the_token_nothing_is_answered(stranger):
+def test_without_the_token_nothing_is_answered(visitor):
     for path in ("/", "/?token=wrong", "/static/main.js", "/api/take", f"/api/image/{CAMERA}/0"):
-        answer = stranger.get(path)
+        answer = visitor.get(path)
         assert answer.status_code == 401
         assert "with its token" in answer.text
-    assert (
-        stranger.get("/", headers={"Cookie": f"vermilion_sketch_{PORT}=guess"}).status_code == 401
-    )
+    assert visitor.get("/", headers={"Cookie": f"vermilion_sketch_{PORT}=guess"}).status_code == 401
 
 
-def test_the_token_becomes_a_cookie_that_scripts_and_other_sites_do_not_get(stranger, gate):
-    answer = stranger.get(f"/?token={gate.token}")
+def test_the_token_becomes_a_cookie_that_scripts_and_other_sites_do_not_get(visitor, gate):
+    answer = visitor.get(f"/?token={gate.token}")
     assert (answer.status_code, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
     assert gate.token not in answer.headers["set-cookie"]
-    assert stranger.get("/api/take").json()["take"] == TAKE
+    assert visitor.get("/api/take").json()["take"] == TAKE
 
 
 @pytest.mark.parametrize("host", ["example.org", f"example.org:{PORT}", "127.0.0.1:1", ""])
@@ -143,14 +141,14 @@ def test_a_link_on_another_site_is_refused(page):
     assert page.get("/", headers={"Sec-Fetch-Site": "none"}).status_code == 200
 
 
-def test_there_is_no_socket(page, stranger):
-    for client in (page, stranger):
+def test_there_is_no_socket(page, visitor):
+    for client in (page, visitor):
         with pytest.raises(WebSocketDisconnect), client.websocket_connect("/api/status"):
             pass
 
 
-def test_every_answer_forbids_foreign_and_inline_scripts(page, stranger):
-    for answer in (page.get("/"), page.get("/api/take"), page.get("/nothing"), stranger.get("/")):
+def test_every_answer_forbids_foreign_and_inline_scripts(page, visitor):
+    for answer in (page.get("/"), page.get("/api/take"), page.get("/nothing"), visitor.get("/")):
         policy = answer.headers["content-security-policy"]
         assert "default-src 'none'" in policy
         assert "script-src 'self';" in policy

@@ -56,6 +56,8 @@ def main(words: list[str] | None = None) -> int:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listener.bind((HOST, options.port))
+            # From here on a browser may come: it waits until the server answers.
+            listener.listen()
         except OSError as error:
             print(f"Port {options.port} cannot be used ({error}); say --port 0.", file=sys.stderr)
             return 1

@@ -44,7 +44,7 @@ class PropagationRun:
         self._state, self._sentence = "idle", ""
         self._done = self._total = 0
         self._rule, self._failed_rule, self._failed_log = "", "", ""
-        self._start = self._end = 0.0
+        self._start = self._last_end = self._end = 0.0
 
     def jobs(self) -> dict[str, int]:
         """Rule -> number of jobs that a run would start. Raises VermilionError where it cannot be told."""
@@ -95,7 +95,10 @@ class PropagationRun:
             taken = (self._end or time.time()) - self._start if self._start else 0.0
             left = None
             if self._state == "running" and self._done and self._total:
-                left = taken / self._done * (self._total - self._done)
+                # As long a job as those that ended; what the present one has taken is over.
+                job = (self._last_end - self._start) / self._done
+                since = time.time() - self._last_end
+                left = max(job * (self._total - self._done) - since, 0.0)
             return {
                 "state": self._state, "done": self._done, "total": self._total,
                 "rule": self._rule, "taken_s": taken, "left_s": left,
@@ -132,6 +135,7 @@ class PropagationRun:
         self._lines.append(line)
         if found := _STEPS.match(line):
             self._done, self._total = int(found[1]), int(found[2])
+            self._last_end = time.time()
         elif found := re.match(r"^total\s+(\d+)", line):
             self._total = int(found[1])
         elif found := _RULE.match(line):

@@ -142,7 +142,7 @@ export class ImageView {
       return;
     }
     const shaded = this.shaded(packet);
-    c.globalAlpha = 0.9;
+    c.globalAlpha = 0.8;
     for (const { i, j, k, colour } of shaded) {
       c.beginPath();
       c.moveTo(px[i], px[i + 1]); c.lineTo(px[j], px[j + 1]); c.lineTo(px[k], px[k + 1]); c.closePath();

@@ -3,10 +3,10 @@ const held = (event) => (event.ctrlKey || event.metaKey ? "Ctrl+" : "") + (event
 
 export class Keys {
   constructor() { this.actions = new Map(); this.sections = []; }
-  // `rows`: [keys, what it does, action]; keys "A", "Shift+N", "Ctrl+Z" or several with spaces.
+  // `rows`: [key or list of keys, what it does, action]; a key is "A", "Shift+N", "Ctrl+Z".
   add(title, rows) {
     this.sections.push({ title, rows });
-    for (const [keys, , action] of rows) for (const key of keys.split(" ")) this.actions.set(key.toLowerCase(), action);
+    for (const [keys, , action] of rows) for (const key of [keys].flat()) this.actions.set(key.toLowerCase(), action);
   }
   handle(event) {
     const target = event.target;
@@ -29,7 +29,7 @@ export class Keys {
         const row = section.appendChild(document.createElement("div"));
         row.appendChild(document.createElement("span")).textContent = what;
         const names = row.appendChild(document.createElement("span"));
-        for (const key of keys.split(" ")) {
+        for (const key of [keys].flat()) {
           names.appendChild(document.createElement("kbd")).textContent = key
             .replace("ArrowLeft", "←").replace("ArrowRight", "→").replace("ArrowUp", "↑").replace("ArrowDown", "↓");
           names.append(" ");

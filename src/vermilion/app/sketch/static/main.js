@@ -58,7 +58,7 @@ function show() {
 function put(image, base, after) {
   for (const shown of [view, second]) Object.assign(shown, { image, base, after, sketch: sketch(), topology });
   view.onion = onionSketch();
-  if (base && framed !== state.camera) { framed = state.camera; fitMouth(); }
+  if (base && framed !== state.camera && !drawing.gesture) { framed = view.canvas.dataset.framed = state.camera; fitMouth(); }
   view.draw();
   if (state.review) second.draw();
   const packet = state.layer === "after" && after ? after : base;
@@ -111,6 +111,7 @@ function controls() {
   byId("brightness").value = state.brightness;
   document.body.classList.toggle("review", state.review);
   for (const [id, hidden] of [["mesh", state.review], ["second", !state.review], ["review", !state.review], ["right-bar", state.review]]) byId(id).hidden = hidden;
+  for (const id of ["from-mesh", "copy", "onion", "magnet", "near"]) byId(id).hidden = state.review;
   const waiting = book.unsaved().length, saved = byId("saved");
   saved.textContent = entry.refused ? "not saved" : waiting ? "saving..." : "saved";
   saved.className = entry.refused ? "unsaved" : "";
@@ -223,7 +224,7 @@ function build() {
   button("edits", "undo", "↶", "", "Undo in this frame (Ctrl+Z)", undo);
   button("edits", "redo", "↷", "", "Redo in this frame (Ctrl+Y)", redo);
   button("left-bar", "from-mesh", "From mesh", "K", "Start from the mesh's own contour", fromMesh);
-  button("left-bar", "copy", "Copy frame", "C", "Start from the nearest drawn frame", copyNeighbour);
+  button("left-bar", "copy", "Copy", "C", "Start from the nearest drawn frame", copyNeighbour);
   button("left-bar", "onion", "Onion", "O", "Show the nearest drawn frame's curves", flip("onion"));
   button("left-bar", "magnet", "Magnet", "G", "Pull strokes onto the detected contour", flip("magnet"));
   button("left-bar", "near", "Near", "T", "The contour runs only about here", () => drawing.toggleKind());
@@ -257,7 +258,8 @@ function build() {
 }
 
 function bindKeys() {
-  const keys = new Keys(), turn = (yaw, pitch) => () => mesh3d && mesh3d.turn(yaw, pitch);
+  const keys = new Keys();
+  const along = ({ key }, step) => [{ ArrowLeft: -step, ArrowRight: step }[key] || 0, { ArrowUp: -step, ArrowDown: step }[key] || 0];
   const arrow = (dx, dy, otherwise) => () => { if (!drawing.nudge(dx, dy)) otherwise(); };
   const nothing = () => {};
   keys.add("Frames", [
@@ -265,38 +267,36 @@ function bindKeys() {
     ["ArrowRight", "next frame (or moves the chosen handle)", arrow(0.5, 0, () => goTo(state.frame + 1))],
     ["Shift+ArrowLeft", "10 frames back (handle: 3 px)", arrow(-3, 0, () => goTo(state.frame - 10))],
     ["Shift+ArrowRight", "10 frames on (handle: 3 px)", arrow(3, 0, () => goTo(state.frame + 10))],
-    [", .", "one frame, always", (event) => goTo(state.frame + (event.key === "," ? -1 : 1))],
+    [[",", "."], "one frame, always", (event) => goTo(state.frame + (event.key === "," ? -1 : 1))],
     ["Home", "first frame", () => goTo(facts.first)], ["End", "last frame", () => goTo(facts.last)],
     ["N", "next suggested frame", () => jump(1)], ["Shift+N", "suggested frame before", () => jump(-1)],
     ["Space", "play, stop", play],
-    ["PageUp", "camera before", () => cameraStep(-1)], ["PageDown", "next camera", () => cameraStep(1)],
+    [["PageUp", "PageDown"], "camera before, next camera", (event) => cameraStep(event.key === "PageUp" ? -1 : 1)],
   ]);
   keys.add("Curves", [
     ...facts.curves.map((name, i) => [String(i + 1), name.replace("_", " "), () => set({ curve: name, handle: -1 })]),
     ["Q", "draw", () => set({ tool: "draw" })], ["E", "erase", () => set({ tool: "erase" })], ["H", "pan", () => set({ tool: "pan" })],
     ["K", "from the mesh's contour", fromMesh], ["C", "copy the nearest drawn frame", copyNeighbour],
     ["O", "onion skin", flip("onion")], ["G", "magnet", flip("magnet")], ["T", "sure or near", () => drawing.toggleKind()],
-    ["[ ]", "choose a handle", (event) => drawing.choose(event.key === "[" ? -1 : 1)],
-    ["ArrowUp", "moves the chosen handle up", arrow(0, -0.5, nothing)], ["ArrowDown", "moves it down", arrow(0, 0.5, nothing)],
-    ["Shift+ArrowUp", "up by 3 px", arrow(0, -3, nothing)], ["Shift+ArrowDown", "down by 3 px", arrow(0, 3, nothing)],
+    [["[", "]"], "choose a handle", (event) => drawing.choose(event.key === "[" ? -1 : 1)],
+    [["ArrowUp", "ArrowDown"], "move the chosen handle", (event) => arrow(0, event.key === "ArrowUp" ? -0.5 : 0.5, nothing)()],
+    [["Shift+ArrowUp", "Shift+ArrowDown"], "by 3 px", (event) => arrow(0, event.key === "ArrowUp" ? -3 : 3, nothing)()],
     ["A", "add a handle after the chosen one", () => drawing.addAfter()],
-    ["Delete Backspace", "remove the chosen handle", () => drawing.removeHandle()], ["X", "remove the curve", () => drawing.removeCurve()],
-    ["Ctrl+Z", "undo, in this frame", undo], ["Ctrl+Y Ctrl+Shift+Z", "redo, in this frame", redo],
+    [["Delete", "Backspace"], "remove the chosen handle", () => drawing.removeHandle()], ["X", "remove the curve", () => drawing.removeCurve()],
+    ["Ctrl+Z", "undo, in this frame", undo], [["Ctrl+Y", "Ctrl+Shift+Z"], "redo, in this frame", redo],
   ]);
   keys.add("Correction", [
     ["Enter", "solve the frame", solve], ["P", "propagate to the take", () => propagation.open(status.run)],
     ["B", "before, after", before], ["S", "side by side", () => setReview(!state.review)],
   ]);
   keys.add("View", [
-    ["+ =", "zoom in", () => view.zoom(1.25)], ["-", "zoom out", () => view.zoom(0.8)],
+    [["+", "="], "zoom in", () => view.zoom(1.25)], ["-", "zoom out", () => view.zoom(0.8)],
     ["0", "the mouth", fitMouth], ["9", "the whole image", fitImage],
-    ["Ctrl+ArrowLeft", "pan", () => view.pan(60, 0)], ["Ctrl+ArrowRight", "pan", () => view.pan(-60, 0)],
-    ["Ctrl+ArrowUp", "pan", () => view.pan(0, 60)], ["Ctrl+ArrowDown", "pan", () => view.pan(0, -60)],
+    [["Ctrl+ArrowLeft", "Ctrl+ArrowRight", "Ctrl+ArrowUp", "Ctrl+ArrowDown"], "pan", (event) => view.pan(...along(event, -60))],
     ["U", "darker", () => bright(0.87)], ["I", "lighter", () => bright(1.15)],
     ["V", "contours of the mesh", flip("contours")], ["M", "mesh over the image: wire, shaded, off", overlay],
     ["W", "wireframe in 3D", flip("wireframe")], ["D", "distance colours in 3D", flip("distance")],
-    ["Alt+ArrowLeft", "turn the mesh", turn(0.15, 0)], ["Alt+ArrowRight", "turn the mesh", turn(-0.15, 0)],
-    ["Alt+ArrowUp", "turn the mesh", turn(0, -0.15)], ["Alt+ArrowDown", "turn the mesh", turn(0, 0.15)],
+    [["Alt+ArrowLeft", "Alt+ArrowRight", "Alt+ArrowUp", "Alt+ArrowDown"], "turn the mesh", (event) => mesh3d && mesh3d.turn(...along(event, -0.15))],
     ["Alt+0", "the mesh from the front", () => mesh3d && mesh3d.reset()],
     ["?", "this sheet", () => byId("help").showModal()],
     ["Escape", "let go of the handle; close", () => (state.review ? setReview(false) : set({ handle: -1, playing: false }))],
@@ -314,7 +314,8 @@ async function start() {
   await poll();
   const left = status.suggested.filter((frame) => !status.sketched.includes(frame));
   const kept = Number(sessionStorage.getItem(`vermilion/${facts.take}/frame`) ?? NaN);
-  const first = Number.isInteger(kept) && kept >= facts.first && kept <= facts.last && sessionStorage.length ? kept : left[0] ?? facts.first;
+  const first = kept >= facts.first && kept <= facts.last ? kept : left[0] ?? facts.first;
+  sessionStorage.setItem(`vermilion/${facts.take}/frame`, String(first));
   Object.assign(state, { camera: facts.cameras[0].name, frame: first, curve: facts.curves[0] });
   view = new ImageView(byId("image"));
   second = new ImageView(byId("second"));

@@ -88,8 +88,9 @@ export function show(run) {
   const share = run.total ? run.done / run.total : 0;
   if (run.state === "running") {
     const left = run.left_s === null ? "" : `, about ${duration(run.left_s)} left`;
-    const rule = run.rule ? ` (${run.rule})` : "";
-    say(`${run.done} of ${run.total || "?"} jobs done${rule}, ${duration(run.taken_s)} so far${left}.`, { cancel: true, bar: share });
+    const rule = run.rule ? ` (${run.rule})` : "", sofar = `${duration(run.taken_s)} so far`;
+    const sentence = run.total ? `${run.done} of ${run.total} jobs done${rule}, ${sofar}${left}.` : `The workflow plans its jobs, ${sofar}.`;
+    say(sentence, { cancel: true, bar: share });
     return false;
   }
   if (run.state === "cancelling") { say("Stopping the jobs...", { bar: share }); return false; }
