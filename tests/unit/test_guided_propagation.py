@@ -9,6 +9,7 @@ from tests.unit.procedural_mouth import mouth
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.guided.contact import LipVolumes
 from vermilion.guided.propagation import LipPropagator
+from vermilion.guided.regions import rim_fade
 from vermilion.guided.suggestion import (
     extreme_frames,
     mouth_deformation,
@@ -224,6 +225,49 @@ def test_other_choices():
     np.testing.assert_array_equal(drawn, random_frames(100, 10, seed=2))
     with pytest.raises(InputError, match="a number from 1 to 5"):
         uniform_frames(5, 6)
+
+
+def jaw_at_the_wrong_depth(take: np.ndarray) -> np.ndarray:
+    """The take with the mouth region too deep by what the mouth is open, fading to its rim."""
+    face, regions = mouths.small_face(), mouths.small_regions()
+    lower = face.landmarks[8]
+    open_mm = face.neutral_mm[lower, 1] - take[:, lower, 1]
+    depth = 0.5 * open_mm[:, None] * rim_fade(regions, 6)
+    return take - depth[..., None] * [0.0, 0.0, 1.0]
+
+
+def test_a_mouth_region_that_is_wrong_is_moved_with_its_lips():
+    take = mouths.small_take(14)
+    base = jaw_at_the_wrong_depth(take)
+    frames = suggest_frames(mouth_deformation(base, mouths.small_face().neutral_mm,
+                            mouths.small_regions()), 5)  # fmt: skip
+    others = np.setdiff1d(np.arange(len(take)), frames)
+    before = lip_error(base, take)[others].mean()
+    assert before > 0.5
+    held, moved = (
+        propagator().fit(take[frames], base[frames], whole=whole).correct(base).vertices_mm
+        for whole in (False, True)
+    )
+    assert lip_error(moved, take)[others].mean() < 0.25 * before
+    assert lip_error(moved, take)[others].mean() < 0.5 * lip_error(held, take)[others].mean()
+    rest = rim_fade(mouths.small_regions()) == 0
+    rest[mouths.small_regions().mouth_vertices] = False
+    np.testing.assert_array_equal(moved[:, rest], base[:, rest])
+
+
+def test_where_nothing_was_wrong_the_mouth_region_stays():
+    take = mouths.small_take(6)
+    found = propagator().fit(take[:3], take[:3], whole=True).correct(take).vertices_mm
+    np.testing.assert_allclose(found, take, atol=1e-9)
+
+
+def test_a_moved_mouth_region_comes_back_from_a_file(tmp_path):
+    take = mouths.small_take(6)
+    base = jaw_at_the_wrong_depth(take)
+    fitted = propagator().fit(take[:3], base[:3], whole=True)
+    fitted.save(tmp_path / "p.npz")
+    again = LipPropagator.load(tmp_path / "p.npz").correct(base).vertices_mm
+    np.testing.assert_array_equal(again, fitted.correct(base).vertices_mm)
 
 
 def test_no_lip_passes_through_the_other_after_propagation():

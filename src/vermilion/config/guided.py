@@ -65,10 +65,11 @@ class SketchRefinementConfig(StageConfig):
 class PropagationConfig(StageConfig):
     """From corrected frames to the whole take (Guided18 section 4)."""
 
-    predict: Literal["change", "lips"] = Field(
+    predict: Literal["change", "mouth", "lips"] = Field(
         "change",
         description="`change`: how the lips differ from the sequence, so that nothing changes where "
-        "nothing was wrong; `lips`: the lips themselves, as the paper.",
+        "nothing was wrong; `mouth`: the same and how the whole mouth region was moved, for a sequence "
+        "whose chin and cheeks are wrong, too (the track C); `lips`: the lips themselves, as the paper.",
     )
     with_neutral: bool = Field(
         True, description="The neutral counts as one more corrected frame; `false`: as the paper."

@@ -14,8 +14,9 @@ from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.contact import separate_lips
 from vermilion.guided.dirichlet import FOLLOW_MM, GradientIntegrator
 from vermilion.guided.gradients import NeutralTriangles
+from vermilion.guided.mouth_change import MouthChange
 from vermilion.guided.reduced_regression import ReducedRegression
-from vermilion.guided.regions import GuidedRegions
+from vermilion.guided.regions import GuidedRegions, rim_fade
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError, ModelFileError
 
@@ -56,6 +57,7 @@ class LipPropagator:
             themselves (False, the paper).
         scale: mean length of the corrected frames' trusted gradients less the neutral's.
         regression: fitted by `fit`.
+        change: of the whole mouth region; None where the region is trusted (the paper).
     """
 
     def __init__(
@@ -82,7 +84,7 @@ class LipPropagator:
         # Only the mouth takes part; `local` numbers its vertices.
         self._mouth = regions.mouth_vertices
         local, rest = regions.restricted(self._mouth), self.neutral_mm[self._mouth]
-        self._local = local
+        self._local, self._fade = local, rim_fade(regions)[self._mouth]
         self.integrator = GradientIntegrator(rest, local, follow_mm)
         self._trusted = NeutralTriangles(rest, local.triangles[local.trusted])
         self._predicted = NeutralTriangles(rest, local.triangles[local.predicted])
@@ -90,6 +92,7 @@ class LipPropagator:
         self._energy = ConstrainedEnergy(self.integrator.factor, regions.free, regions.n_vertices)
         self.base, self.scale = False, 0.0
         self.regression: ReducedRegression | None = None
+        self.change: MouthChange | None = None
 
     def fit(
         self,
@@ -97,6 +100,7 @@ class LipPropagator:
         base_mm: np.ndarray | None = None,
         change: bool = True,
         with_neutral: bool = True,
+        whole: bool = False,
     ) -> Self:
         """Learn from k corrected frames.
 
@@ -108,18 +112,24 @@ class LipPropagator:
             change: with a base, predict the change of its lips' gradients, so that where nothing was
                 wrong in training nothing changes; False: the lips themselves.
             with_neutral: the neutral counts as one more corrected frame, which costs nobody work.
+            whole: with a base, move the whole mouth region as the corrected frames' was moved
+                (`MouthChange`), so that the lips are not held by a border that is wrong.
 
         Raises:
             InputError: no frames, another topology, or a mesh that is not finite.
         """
         self._check_meshes(corrected_mm, "corrected frames")
         aligned, motions = self._aligned(corrected_mm)
-        x = self._predicted.gradients(aligned)
+        corrected, x = aligned, self._predicted.gradients(aligned)
         self.base = change and base_mm is not None
         if base_mm is not None:
             self._check_meshes(base_mm, "base frames")
             aligned = move_frames(base_mm[:, self._mouth], *motions)
         y = self._trusted.gradients(aligned)
+        self.change = None
+        if whole and base_mm is not None:
+            moved = (corrected - aligned) * self._fade[:, None]
+            self.change = MouthChange.of(y - self._neutral_y, moved)
         self.scale = float(np.linalg.norm(y - self._neutral_y, axis=1).mean())
         if self.base:
             x = x - self._predicted.gradients(aligned)
@@ -157,13 +167,21 @@ class LipPropagator:
             x = self.regression.predict(y)
             if self.base:
                 x += self._predicted.gradients(aligned)
+            if self.change is not None:
+                aligned = aligned + self.change.predict(y - self._neutral_y)
             corrected = self.integrator.integrate(x, aligned)
             if crossings is not None:
                 depth[part] = self._separate_lips(corrected, aligned, crossings)
-            for ids in (self._local.free, self._local.followers):
+            for ids in self._moved_vertices():
                 moved = (corrected[:, ids] - translations_mm[:, None]) @ rotations
                 result[part, self._mouth[ids]] = moved
         return Propagation(result, unexplained, depth)
+
+    def _moved_vertices(self) -> tuple[np.ndarray, ...]:
+        """Local numbers of the vertices that a correction moves."""
+        if self.change is not None:
+            return (np.arange(len(self._mouth)),)
+        return self._local.free, self._local.followers
 
     def save(self, path: str | Path) -> None:
         """Write the fitted propagator as `.npz` (no pickle), whole or not at all."""
@@ -178,6 +196,7 @@ class LipPropagator:
             "scale": np.float64(self.scale),
             **self.regions.arrays(),
             **self.regression.arrays(),
+            **({} if self.change is None else self.change.arrays()),
         }
         write_arrays(path, **arrays)
 
@@ -213,6 +232,7 @@ class LipPropagator:
         result = cls(arrays["neutral_mm"], regions, arrays["stable"], float(arrays["follow_mm"]))
         result.base, result.scale = bool(arrays["base"]), float(arrays["scale"])
         result.regression = ReducedRegression.from_arrays(arrays, str(path))
+        result.change = MouthChange.from_arrays(arrays)
         return result
 
     def _separate_lips(

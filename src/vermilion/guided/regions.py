@@ -185,6 +185,18 @@ def movable_vertices(regions: GuidedRegions) -> np.ndarray:
     return np.flatnonzero(inside & ~((neighbours @ (~inside).astype(float)) > 0))
 
 
+def rim_fade(regions: GuidedRegions, rings: int = 4) -> np.ndarray:
+    """(V,) in [0, 1]: 0 at the mouth region's rim and outside it, 1 from `rings` edges inside on."""
+    inside = np.zeros(regions.n_vertices, dtype=bool)
+    inside[movable_vertices(regions)] = True
+    neighbours = adjacency(regions.triangles, regions.n_vertices)
+    result = np.zeros(regions.n_vertices)
+    for _ in range(rings):
+        result += inside / rings
+        inside = inside & ~((neighbours @ (~inside).astype(float)) > 0)
+    return result
+
+
 def _as_mask(vertices: np.ndarray, n_vertices: int, name: str) -> np.ndarray:
     vertices = np.asarray(vertices)
     if vertices.dtype == bool and vertices.shape == (n_vertices,):

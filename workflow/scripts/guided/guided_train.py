@@ -27,8 +27,9 @@ def main(snakemake):
     stable = np.flatnonzero(face.regions["rigid"])
     propagator = LipPropagator(neutral, regions, stable, options.follow_mm)
     propagator.fit(
-        corrected, base, change=options.predict == "change", with_neutral=options.with_neutral
-    )
+        corrected, base, change=options.predict != "lips", with_neutral=options.with_neutral,
+        whole=options.predict == "mouth",
+    )  # fmt: skip
     print(
         f"{len(corrected)} corrected frames, {len(regions.trusted)} trusted and "
         f"{len(regions.predicted)} predicted triangles"
