@@ -37,7 +37,7 @@ class MouthChange:
 
     @classmethod
     def of(cls, deformations: np.ndarray, moved_mm: np.ndarray) -> Self:
-        """Learn from k frames: deformations (k, D) from the neutral and displacements (k, U, 3)."""
+        """Learn from k frames: `deformations` (k, D) from the neutral, displacements `moved_mm` (k, U, 3)."""
         y = np.asarray(deformations, dtype=np.float64)
         scale = max(float((y**2).sum(axis=1).mean()), 1e-300)
         system = y @ y.T / scale + OFFSET + RIDGE * np.eye(len(y))
