@@ -1,14 +1,14 @@
 """User-guided lip correction (Guided18): a person corrects a few frames, and the take follows.
 
 Off unless `guided.takes` names takes. Sketches and sculpts are input files of the capture:
-`labels/sketches/<camera>/<frame>.json`, `labels/sculpts/<frame>.obj` or `.ply`. In the order of the
+`labels/sketches/<camera>/<frame>.json`, `labels/sculpts/<frame>.obj`, `.ply` or `.usd`. In the order of the
 paper: `guided_suggest` (7), `guided_refine` (5), `guided_train` and `guided_correct` (4), then the files
 that `apply` exports, all in takes/<subject>/<take>/guided/.
 """
 
+from vermilion.guided.sculpt_files import SCULPT_SUFFIXES as SCULPTS
 from vermilion.imaging.source import folder_of
 
-SCULPTS = (".obj", ".ply")
 #: Sequence that is corrected -> its chunks.
 SEQUENCES = {"base": P.coarse, "corrected": P.corrected, "H": P.accurate}
 

@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh
+from vermilion.guided.sculpt_files import USD_SUFFIXES
 from vermilion.guided.sketch import Sketch, read_sketch
 from vermilion.storage.errors import InputError
+from vermilion.tracking.external.read import read_tracked
 
 
 def sketch_cameras(
@@ -66,14 +69,14 @@ def read_sculpt(path: str | Path, triangles: np.ndarray, n_vertices: int) -> np.
     """A sculpted mesh of the sequence's topology, (V, 3) mm.
 
     Args:
-        path: OBJ or PLY.
+        path: OBJ, PLY or USD; an animated USD is read at the frame that the file is named after.
         triangles: (T, 3) of the sequence.
         n_vertices: V.
 
     Raises:
         InputError: another topology, or numbers that are not finite.
     """
-    mesh = read_mesh(path)
+    mesh = _read_sculpted(Path(path))
     same = mesh.triangles.shape == triangles.shape and (mesh.triangles == triangles).all()
     if len(mesh.vertices_mm) != n_vertices or not same:
         raise InputError(
@@ -88,3 +91,10 @@ def read_sculpt(path: str | Path, triangles: np.ndarray, n_vertices: int) -> np.
             path=path,
         )  # fmt: skip
     return mesh.vertices_mm
+
+
+def _read_sculpted(path: Path) -> Mesh:
+    if path.suffix.lower() not in USD_SUFFIXES:
+        return read_mesh(path)
+    found = read_tracked(path, [int(path.stem) if path.stem.isdigit() else 0])
+    return Mesh(found.vertices_mm[0].astype(np.float64), found.triangles)
