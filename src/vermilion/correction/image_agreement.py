@@ -1,4 +1,4 @@
-"""The corrected mesh made to agree with the image: pose, contours, contact, in that order.
+"""The corrected mesh made to agree with the image: pose, contours, contact, in that order; folds are taken out.
 
 Layers give detail and displacements the position over long ranges. The image shows where the lips lie, so
 neither decides that (Lips16 section 7 names contours as constraints of the solve as future work).
@@ -22,12 +22,14 @@ from vermilion.correction.lip_constraints import (
 )
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, apply_motion, repose_motion, smoothed_motion
+from vermilion.correction.surface_quality import LipSurface
+from vermilion.correction.unfold import Unfolder
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import interocular_px
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.cotangents import bending_stiffness
-from vermilion.geometry.head_frame import world_from_head
+from vermilion.geometry.head_frame import head_from_world, world_from_head
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.landmarks.scheme import EYE_CORNERS
 
@@ -92,6 +94,7 @@ class ImageAgreement:
         self._eyes = face.landmarks[EYE_CORNERS]
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
+        self._unfolder = Unfolder(LipSurface(face), face.triangles, neutral_mm)
         self._crossings = LipCrossings(face)
         self._occluding = OccludingContour.of(face)
         lips = np.union1d(
@@ -134,6 +137,9 @@ class ImageAgreement:
         if found:
             constraints, forces = zip(*found, strict=True)
             head_mm[:, self._free] += self._solver.displacements(constraints, forces)
+        coarse_mm = head_from_world(take.coarse_mm, take.rotation, take.translation_mm)
+        for f in frames:
+            head_mm[f] = self._unfolder.unfold(head_mm[f], coarse_mm[f])
         return world_from_head(head_mm, rotation, translation_mm)
 
     def _reposed(self, head_mm, take, camera, lines, seen, unit_px):

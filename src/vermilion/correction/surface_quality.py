@@ -18,8 +18,10 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, triangle_areas, triangle_cross, unique_edges
 from vermilion.geometry.raycast import RayCaster
 
-#: Two triangles of one lip whose normals are further apart than this are folded (degrees).
+#: Two triangles of one lip are folded whose normals are further apart than this (degrees), ...
 FOLDED_DEG = 120.0
+#: ... unless those of the base track are further apart than this: creases of the face model itself.
+CREASE_DEG = 90.0
 #: The inside of the mouth counts where it lies this far before the vermilion (mm), ...
 _BEFORE_MM = 0.2
 #: ... and where it hides more than this share of the vermilion that faces the camera.
@@ -107,7 +109,7 @@ class LipSurface:
     ) -> SurfaceQuality:
         """Of corrected meshes (F, V, 3) and the base track's (F, V, 3), in the camera's world, mm."""
         frames = range(len(corrected_mm))
-        folded = [self._folded(corrected_mm[f], base_mm[f]) for f in frames]
+        folded = [len(self.folded_triangles(corrected_mm[f], base_mm[f])) for f in frames]
         hidden = [self._hidden_share(corrected_mm[f], camera) for f in frames]
         return SurfaceQuality(
             np.array(folded, dtype=int),
@@ -155,14 +157,14 @@ class LipSurface:
         )
         return result * mm_per_px
 
-    def _folded(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> int:
-        """Lip triangles that fold on a neighbour, where those of the base track do not."""
-        limit = np.cos(np.radians(FOLDED_DEG))
+    def folded_triangles(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> np.ndarray:
+        """Ids (n,) of lip triangles of a mesh (V, 3) that fold on a neighbour where the base track's (V, 3) do not."""
+        folded, crease = np.cos(np.radians((FOLDED_DEG, CREASE_DEG)))
         now, before = (
             (normals[self._pairs[:, 0]] * normals[self._pairs[:, 1]]).sum(axis=1)
             for normals in (self._normals(corrected_mm), self._normals(base_mm))
         )
-        return len(np.unique(self._pairs[(now < limit) & (before >= limit)]))
+        return np.unique(self._pairs[(now < folded) & (before >= crease)])
 
     def _normals(self, vertices_mm: np.ndarray) -> np.ndarray:
         return normalised(triangle_cross(vertices_mm, self._triangles))
