@@ -85,7 +85,7 @@ class ImageAgreementConfig(StageConfig):
         "0: no filter.",
     )
     contour_weight: float = Field(
-        3.0,
+        1.0,
         ge=0.0,
         le=1000.0,
         description="Weight, per millimetre of lip contour, of the constraint that it projects onto the "

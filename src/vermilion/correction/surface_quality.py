@@ -158,7 +158,11 @@ class LipSurface:
         return result * mm_per_px
 
     def folded_triangles(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> np.ndarray:
-        """Ids (n,) of lip triangles of a mesh (V, 3) that fold on a neighbour where the base track's (V, 3) do not."""
+        """Ids (n,) of lip triangles that fold on a neighbour where the base track's do not.
+
+        Args:
+            corrected_mm, base_mm: (V, 3) meshes of one frame, mm; each in any frame.
+        """
         folded, crease = np.cos(np.radians((FOLDED_DEG, CREASE_DEG)))
         now, before = (
             (normals[self._pairs[:, 0]] * normals[self._pairs[:, 1]]).sum(axis=1)
