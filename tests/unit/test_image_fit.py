@@ -12,6 +12,7 @@ from vermilion.appearance.samples import sample_skin
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
+from vermilion.storage.errors import InputError
 from vermilion.tracking.image_fit.ablations import ablation_rows
 from vermilion.tracking.image_fit.appearance_frames import choose_appearance_frames
 from vermilion.tracking.image_fit.chunk import FrameChunk, fit_frames
@@ -74,6 +75,16 @@ def test_light_and_albedo_are_told_apart_by_the_skin_that_has_one_colour():
     reddish = found.albedo[0][:60] / found.albedo[0][60:].mean(axis=0)
     assert reddish[:, 0].mean() == pytest.approx(1.0, abs=0.08)
     assert reddish[:, 1].mean() == pytest.approx(0.1 / 0.35, abs=0.12)
+
+
+@pytest.mark.parametrize("trust", [0.0, 1.0])
+def test_images_without_skin_are_an_error_with_a_sentence(trust):
+    """Black images, and a face of which no sample is seen."""
+    normals = unit_vectors(50, 0)[None]
+    samples = SurfacePoints(np.zeros(50, dtype=np.int32), np.full((50, 3), 1 / 3))
+    seen = SampleObservations(np.zeros((1, 1, 50, 3)), normals, np.full((1, 50), trust))
+    with pytest.raises(InputError, match="too small, too dark or hidden"):
+        estimate_appearance(np.arange(1), samples, seen, 0.5)
 
 
 @pytest.fixture(scope="module")

@@ -73,6 +73,7 @@ def correct_lips(
         expected(n_frames, chunk), alone=True,
     )  # fmt: skip
     if skipped:
+        print(f"Nothing was made of {source.name}: {skipped[takes[0].name]}", file=sys.stderr)
         return code or 1
     pages = sorted(Path(results).glob("apply/*/*/lips.html"))
     for page in pages if code == 0 else []:

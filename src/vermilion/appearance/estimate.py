@@ -17,6 +17,7 @@ from vermilion.appearance.harmonics import harmonics, irradiance
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.errors import InputError
 
 #: Assumed mean linear albedo of skin: images do not determine the scale of light against albedo.
 SKIN_ALBEDO = 0.35
@@ -91,6 +92,9 @@ def estimate_appearance(
         samples: N places on the mesh.
         seen: their colours in these frames.
         albedo_prior: weight of the skin's median colour at each sample, in frames.
+
+    Raises:
+        InputError: the images show no skin.
     """
     finest, trust = seen.colours[:, 0], seen.trust
     basis = harmonics(seen.normals)
@@ -144,6 +148,12 @@ def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
             w = weights * robust[:, c] * slope[:, c] ** 2
             weighted = rows * (w * albedos[:, c] ** 2)[:, None]
             matrix = weighted.T @ rows
+            if not np.trace(matrix) > 0:
+                raise InputError(
+                    "no skin that its images show: the face is too small, too dark or hidden",
+                    "a face whose eyes are some 60 pixels apart, in some frames",
+                    "Leave the take out, or give frames that show the face larger.",
+                )
             right = rows.T @ (w * albedos[:, c] * values[:, c])
             light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
         error = slope * (values - albedos * (rows @ light))
