@@ -209,3 +209,25 @@ def test_the_file_says_all(detector, tmp_path):
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_narrow_opening_of_dense_landmarks_stays_open():
+    """Their rings are off by what differs from frame to frame: outside where mouths are wide open."""
+    detector = TrackRidgeDetector(reach=0.02)
+    images, regions = [], []
+    for seed, (opening, height) in enumerate(SHAPES):
+        image, landmarks, _ = draw_mouth(opening, height, seed=seed)
+        off = 4.0 if opening > 5 else 0.0
+        regions.append(detector.region(landmarks, rings(opening, height, 0.0, off)))
+        images.append(regions[-1].crop(image))
+    image, landmarks, label = draw_mouth(3.0, 24.0, seed=9)
+    error, height = {}, {}
+    for inner in (True, False):
+        found = learn_borders(detector, images, regions, 0.08, inner)
+        border = borders_px(found, image, landmarks, rings(3.0, 24.0))[1]
+        error[inner] = distance_to_polyline(border, label.inner.points_px, True).mean()
+        height[inner] = np.ptp(border[:, 1])
+    assert error[False] < 1.0
+    assert error[True] > 2 * error[False]
+    assert 5.0 < height[False] < 9.0  # it is 6
+    assert height[True] < 2.0

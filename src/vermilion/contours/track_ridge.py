@@ -162,6 +162,7 @@ def learn_from_take(
     landmarks_px: Callable[[int], np.ndarray],
     lips_px: Callable[[int], tuple[np.ndarray, np.ndarray]],
     reach: float,
+    inner: bool = True,
 ) -> TrackRidgeDetector | None:
     """The detector of a take, its borders learnt from some of its frames; None where none serves.
 
@@ -170,7 +171,7 @@ def learn_from_take(
         frames: numbers of those to learn from; what cannot be read or has no mouth is left out.
         read: frame -> image (h, w, 3) linear RGB; landmarks_px: frame -> (66, 2); lips_px: frame ->
             outer and inner ring (n, 2) of the tracked lips.
-        reach: as of `learn_borders`.
+        reach, inner: as of `learn_borders`.
     """
     images, regions = [], []
     for frame in progress(list(frames), "frames that tell the lips"):
@@ -183,7 +184,7 @@ def learn_from_take(
             continue
         regions.append(detector.region(points, lips_px(frame)))
         images.append(regions[-1].crop(image))
-    return learn_borders(detector, images, regions, reach) if images else None
+    return learn_borders(detector, images, regions, reach, inner) if images else None
 
 
 def learn_borders(
@@ -191,6 +192,7 @@ def learn_borders(
     images: Sequence[np.ndarray],
     regions: Sequence[MouthRegion],
     reach: float,
+    inner: bool = True,
 ) -> TrackRidgeDetector:
     """The detector of a take, its borders learnt from some of its frames.
 
@@ -198,6 +200,8 @@ def learn_borders(
         detector: with the settings, no borders yet.
         images: cropped regions (size, size, 3) linear RGB; regions: theirs, with tracked lips.
         reach: how far the outer border may lie from the tracked one, per inter-ocular distance.
+        inner: whether the inner border is off by the same in all frames, as that of tracked lips. The
+            ring of dense landmarks is not: what it is off by on average would close narrow openings.
     """
     size = detector.interocular_size_px
     colours = [blurred_colours(image) for image in images]
@@ -220,7 +224,7 @@ def learn_borders(
         detector,
         outer_offset=offset / size, direction=direction, middle=middle, inner_offset=np.zeros(CURVE_POINTS),
     )  # fmt: skip
-    for _ in range(INNER_ROUNDS):
+    for _ in range(INNER_ROUNDS if inner else 0):
         found = []
         for planes, region in zip(colours, regions, strict=True):
             outer = loop_spline(detector.outer_border(planes, region)[0])

@@ -37,9 +37,10 @@ class TrackedRings:
         return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
 
 
-def from_track(cfg, camera, source, track, rings, inner_reach):
+def from_track(cfg, camera, source, track, rings, dense):
     """The detector that a take's own images and the rings tell; None where no frame serves."""
     options = cfg.track
+    inner_reach = cfg.lips_reach if dense else options.inner_reach
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector.of(
         cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach
@@ -51,6 +52,7 @@ def from_track(cfg, camera, source, track, rings, inner_reach):
         landmarks.__getitem__,
         rings,
         options.reach,
+        inner=not dense,
     )
 
 
@@ -73,8 +75,7 @@ def main(snakemake) -> None:
         )
     if cfg.kind in ("auto", "track"):
         rings = LandmarkRings(found) if dense else TrackedRings(snakemake.input, track)
-        reach = cfg.lips_reach if dense else cfg.track.inner_reach
-        by_track = from_track(cfg, camera, source, track, rings, reach)
+        by_track = from_track(cfg, camera, source, track, rings, dense)
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)
     if labelled:
