@@ -11,6 +11,7 @@ rule features:
         fit=P.fit,
         coarse=P.coarse,
         maps=P.maps,
+        landmarks=P.landmarks,
     output:
         features=P.features,
         quality=P.features_quality,

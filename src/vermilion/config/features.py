@@ -63,6 +63,13 @@ class ContourFeaturesConfig(StageConfig):
         le=1,
         description="A frame with a smaller share of its outer contour found is flagged.",
     )
+    most_apart: float = Field(
+        0.05,
+        gt=0,
+        le=1,
+        description="A frame whose inner contour lies farther than this from both the lips of dense landmarks "
+        "(detector `mediapipe`) and the tracked ones (mean) is flagged and left out.",
+    )
     overlay_frames: int = Field(
         15, ge=1, le=200, description="Frames at most in a chunk's overlay image."
     )

@@ -96,7 +96,7 @@ class ImageAgreement:
         self._free = integrator.free
         self._unfolder = Unfolder(LipSurface(face), face.triangles, neutral_mm)
         self._crossings = LipCrossings(face)
-        self._occluding = OccludingContour.of(face)
+        self._occluding = OccludingContour.of(face, with_inside=False)
         lips = np.union1d(
             *(part.points.vertices(face.triangles) for part in (self._samples, self._occluding))
         )
@@ -168,17 +168,19 @@ class ImageAgreement:
         place = rotation, translation_mm
         robust_mm = self.settings.contour_robust_mm
 
-        def on_contours(samples: LipSamples) -> LinearConstraints:
+        def on_contours(samples: LipSamples, now: np.ndarray) -> LinearConstraints:
             return contour_constraints(
-                samples, vertices, *place, image.camera, lines, weight or 1.0, robust_mm
+                samples, vertices, *place, image.camera, lines, weight or 1.0, robust_mm, now
             )
 
-        constraints = on_contours(seen)
-        if weight > 0:  # which points form the inner contour, once more at about the result
+        constraints = on_contours(seen, vertices)
+        if (
+            weight > 0
+        ):  # which points form the inner contour, and which are far off, at about the result
             now = np.array(vertices)
             forces = self._solver.forces(constraints)
             now[self._lips] += self._solver.displacements_at(self._lips, constraints, forces)
-            constraints = on_contours(self._seen(now, *place, image, f))
+            constraints = on_contours(self._seen(now, *place, image, f), now)
         else:
             constraints = constraints[:0]
         if not self.settings.contact:

@@ -64,6 +64,7 @@ def contour_constraints(
     lines: tuple[np.ndarray, np.ndarray, np.ndarray],
     weight: float,
     robust_mm: float,
+    now_mm: np.ndarray | None = None,
 ) -> LinearConstraints:
     """Each sample projects on its line: point to line in the image, depth free, linearised at the mesh.
 
@@ -73,13 +74,18 @@ def contour_constraints(
         lines: (m, 2) points, (m, 2) normals, (m,) known, of `ImageContours.lines`.
         weight: of a millimetre of contour.
         robust_mm: a point this far off counts half.
+        now_mm: (V, 3) head frame, the mesh that points are off from, an earlier solution; None: `vertices_mm`.
     """
     points_px, normals, known = lines
     world = samples.points.sample(vertices_mm, samples.triangles) @ rotation.T + translation_mm
     across = np.einsum("mk,mkj->mj", normals, camera.pixel_jacobian(world) @ rotation)
     px_per_mm = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
     off_mm = ((points_px - camera.project(world)) * normals).sum(axis=1) / px_per_mm
-    counts = weight * samples.length_mm / (1.0 + (off_mm / robust_mm) ** 2)
+    left_mm = off_mm
+    if now_mm is not None:
+        moved = samples.points.sample(now_mm - vertices_mm, samples.triangles)
+        left_mm = off_mm - (moved * across).sum(axis=1) / px_per_mm
+    counts = weight * samples.length_mm / (1.0 + (left_mm / robust_mm) ** 2)
     made = LinearConstraints(
         samples.points.corners(samples.triangles), samples.points.barycentric,
         across / px_per_mm[:, None], off_mm,

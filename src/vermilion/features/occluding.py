@@ -42,12 +42,12 @@ class OccludingContour:
         return self.points.sample(vertices_mm, self.triangles)
 
     @classmethod
-    def of(cls, model: FaceModel) -> OccludingContour:
-        """Points along every edge of the triangles that belong to one lip.
+    def of(cls, model: FaceModel, with_inside: bool = True) -> OccludingContour:
+        """Points along every edge of the triangles that belong to one lip, `with_inside` a little of its inside.
 
         Extremes of a triangle lie on its edges.
         """
-        sides = lip_sides(model, with_inside=True)
+        sides = lip_sides(model, with_inside=with_inside)
         of_corner = sides[model.triangles]
         whole = (of_corner == of_corner[:, :1]).all(axis=1) & (of_corner[:, 0] != 0)
         start, end = unique_edges(model.triangles[whole]).T

@@ -1,24 +1,35 @@
 """Features of every frame of a chunk: shape coefficients and contour distances (Lips16 5.1)."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from vermilion.config.features import ContourFeaturesConfig, ShapeFeaturesConfig
+from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.maps import evenly, read_maps, sheet
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
+from vermilion.features.contradiction import contradiction
 from vermilion.features.overlay import contours_overlay
 from vermilion.features.search import SearchSettings
 from vermilion.features.shape_space import shape_space
+from vermilion.features.tracked_lips import TrackedLips
 from vermilion.features.vector import FeatureTable, quality_row
 from vermilion.geometry.head_frame import head_from_world
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence
 from vermilion.tracking.result import Identity, TrackedTake
+
+
+def landmark_rings(path):
+    """The lips' rings in the frames of a chunk; None where the landmarks are too few to judge contours."""
+    track = LandmarkTrack.load(path, None)
+    return LandmarkRings(track) if dense_lips(track) else None
 
 
 def main(snakemake) -> None:
@@ -37,6 +48,7 @@ def main(snakemake) -> None:
     sampler = ContourSampler.of(model, cfg.samples, SearchSettings.of(cfg))
     source = open_frames(snakemake.params.source, subject, take)
     shown = evenly(list(snakemake.params.frames), cfg.overlay_frames)
+    rings, lips = landmark_rings(snakemake.input.landmarks), TrackedLips.of(model)
     contours, quality, images = [], [], []
     for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):
         path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
@@ -45,7 +57,15 @@ def main(snakemake) -> None:
         found = sampler.find(coarse[index], fit.camera, maps, pose)
         tracked = bool(fit.valid[rows[index]])
         contours.append(found)
-        quality.append(quality_row(frame, found, tracked, maps is not None, cfg.least_found))
+        row = quality_row(frame, found, tracked, maps is not None, cfg.least_found)
+        if row.valid and rings is not None:
+            known = [
+                (rings(frame) or (None, None))[1],
+                lips.rings_px(coarse[index], fit.camera)[1],
+            ]
+            reason = contradiction(found.inner_px, known, found.interocular_px, cfg.most_apart)
+            row = replace(row, valid=not reason, reason=reason)
+        quality.append(row)
         if frame in shown:
             try:
                 image = source.read(snakemake.params.camera, frame)
