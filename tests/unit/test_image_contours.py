@@ -174,7 +174,9 @@ def test_contours_go_to_their_lines_and_depth_stays():
     image = image_of([lip_patch.vertices_at(1.8, 0.08)])
     assert distance_px(before, image).max() > 2.0
     membrane = fitted(before[None], image, replace(CONTOURS, bending_mm=0.0))[0]
-    assert distance_px(membrane, image).max() < 0.1
+    left = distance_px(membrane, image)
+    assert np.percentile(left, 95) < 0.1
+    assert left.max() < 0.5  # by the corners it is another line that borders the opening
     after = fitted(before[None], image, CONTOURS)[0]  # a plate does not turn at the corners
     assert distance_px(after, image).mean() < 0.1
     moved = after - before
@@ -184,6 +186,30 @@ def test_contours_go_to_their_lines_and_depth_stays():
     assert (
         np.abs((moved[lips] * view).sum(axis=1)).max() < 0.05 * np.linalg.norm(moved, axis=1).max()
     )
+
+
+def test_the_inside_of_a_lip_is_never_pulled_to_the_contour():
+    """Where it hangs over the vermilion, it would be drawn out of the mouth in the lip's place."""
+    before = lip_patch.vertices_at(0.6, 0.0)
+    inside = FACE.regions["mouth_inner"]
+    before[inside, 1] -= 2.0 * np.sign(before[inside, 1] - before[FACE.inner_contour, 1].mean())
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)])
+    solid = ImageAgreement(integrator(), FACE.neutral_mm, FACE, N_SAMPLES, CONTOURS)
+    seen = solid._seen(before, np.eye(3), np.zeros(3), image, 0)
+    assert not inside[seen.points.vertices(FACE.triangles)].any()
+
+
+def test_a_contour_far_off_as_a_whole_counts_and_a_stray_point_does_not():
+    """Two deviations of the robust weight off, the first solve brings the lips near enough to count."""
+    before = lip_patch.vertices_at(0.6, 0.0)
+    image = image_of([lip_patch.vertices_at(1.8, 0.08)])
+    settings = replace(CONTOURS, contour_weight=5.0, contour_robust_mm=0.3)
+    assert distance_px(fitted(before[None], image, settings)[0], image).mean() < 0.3
+    stray = image.outer_px.copy()
+    stray[0, 10] += [0.0, -60.0]
+    after = fitted(before[None], replace(image, outer_px=stray), settings)[0]
+    beside = np.r_[5:8, 13:16]
+    assert distance_px(after, image)[beside].max() < 0.5
 
 
 def test_gradients_across_the_image_stay():
