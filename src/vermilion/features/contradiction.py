@@ -15,9 +15,10 @@ from vermilion.contours.curves import loop_spline
 
 
 def ring_distance(ring_px: np.ndarray, other_px: np.ndarray) -> float:
-    """Mean distance of two closed rings (n, 2) and (m, 2) px: of either to the other, the larger one.
+    """Mean distance of two closed rings: of either to the other, the larger one. NaN where one is not known.
 
-    NaN where one is not known.
+    Args:
+        ring_px: (n, 2); other_px: (m, 2).
     """
     if not (np.isfinite(ring_px).all() and np.isfinite(other_px).all()):
         return np.nan
