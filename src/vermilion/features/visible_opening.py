@@ -99,5 +99,5 @@ def _ends(upper: np.ndarray, lower: np.ndarray, pixels: np.ndarray, step: np.nda
     middle = 0.5 * (over + under)
     crossed = (first <= last)[:, None]
     over, under = np.where(crossed, middle, over), np.where(crossed, middle, under)
-    seen = (upper.any(axis=1) & lower.any(axis=1))[:, None]
+    seen = upper.any(axis=1, keepdims=True) & lower.any(axis=1, keepdims=True)
     return np.where(seen, np.stack([over, under]), np.nan)
