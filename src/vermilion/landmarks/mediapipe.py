@@ -56,7 +56,7 @@ class MediapipeDetector:
             self._start()
         try:
             self._images.write(struct.pack("<3I", height, width, MAX_FACES))
-            self._images.write(memoryview(pixels).cast("B"))
+            self._images.write(pixels.data.cast("B"))
             self._images.flush()
         except OSError as error:
             raise self._ended() from error

@@ -84,7 +84,7 @@ def as_seen_turned(
         at_jaw = project(mesh[model.landmarks], focal_px)
         outline = project(mesh[_silhouette(mesh, model)], focal_px)
         corners = at_jaw[seen.landmark_set.eye_corners]
-        reach_px = _REACH * max(np.linalg.norm(corners[0] - corners[1]), 1.0)
+        reach_px = _REACH * max(float(np.linalg.norm(corners[0] - corners[1])), 1.0)
         for point in seen.landmark_set.jaw:
             if factor[point] >= 1.0:
                 continue
