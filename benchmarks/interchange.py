@@ -47,7 +47,7 @@ def take(folder: Path, frames: int):
     time_s = np.arange(frames) / 25.0
     speeds = rng.uniform(1.0, 5.0, model.n_expressions)
     weights = 0.3 + 0.3 * np.sin(time_s[:, None] * speeds)
-    turn = Rotation.from_euler("y", 10 * np.sin(time_s), degrees=True).as_matrix()
+    turn = Rotation.from_euler("y", 10 * np.sin(time_s)[:, None], degrees=True).as_matrix()
     head = HeadFrame(turn, np.tile([0.0, 0.0, 600.0], (frames, 1)))
     lips = model.neutral_mm[model.outer_contour].mean(axis=0)
     near = np.exp(-((model.neutral_mm - lips) ** 2).sum(axis=1) / 400)

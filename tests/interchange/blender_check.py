@@ -118,7 +118,7 @@ def main():
             pixels.append(float(np.abs(there - (local[:, :2] / local[:, 2:])[chosen]).max()))
     found["error_mm"], found["error_px"] = errors, pixels
     found["moved_mm"] = float(np.abs(positions[-1] - positions[0]).max() * 1000.0)
-    if cameras and kind in ("usd", "alembic"):
+    if cameras and kind in ("usd", "alembic") and folder.name == "tracker":
         render_mask(scene, cameras[0], item, size, result.with_suffix(".png"))
     result.write_text(json.dumps(found))
 

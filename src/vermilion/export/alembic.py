@@ -116,6 +116,7 @@ def _add_camera(face: Any, camera: Camera, unit_mm: float) -> None:
     lens.setVerticalAperture(float(camera.height_px * per_px * squeeze / 10.0))
     lens.setHorizontalFilmOffset(float(-(k[0, 2] - camera.width_px / 2) * per_px / 10.0))
     lens.setVerticalFilmOffset(float((k[1, 2] - camera.height_px / 2) * per_px * squeeze / 10.0))
-    lens.setNearClippingPlane(1.0 / unit_mm)
-    lens.setFarClippingPlane(100000.0 / unit_mm)
+    # Importers that scale the scene leave clipping planes as they are: these suit mm and metres.
+    lens.setNearClippingPlane(0.1)
+    lens.setFarClippingPlane(10000.0)
     AbcGeom.OCamera(place, "cameraShape").getSchema().set(lens)
