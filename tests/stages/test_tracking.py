@@ -8,7 +8,7 @@ import pytest
 from tests.stages.run_script import run_script
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
-from vermilion.config.tracking import MeshesConfig, TrackingConfig
+from vermilion.config.tracking import ExternalConfig, MeshesConfig, TrackingConfig
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
 from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import read_image, write_image
@@ -139,20 +139,28 @@ def test_frames_without_landmarks_are_flagged_and_interpolated(results, tmp_path
     assert np.linalg.norm(meshes[6] - whole[6], axis=-1).mean() < 12.0  # mm, of a quick motion
 
 
+CFG_EXTERNAL = {"tracking.external": ExternalConfig().model_dump()}
+
+
 def test_topology_and_sequences_of_other_trackers(results, tmp_path):
     _, meshes = results
     run_script(
         "tracking/tracked_meshes",
         wildcards={"subject": "s", "take": "t"},
-        params={"cfg": {"tracking.external": {"unit_mm": None}}, "frames": [3, 4]},
+        params={"cfg": CFG_EXTERNAL, "frames": [3, 4, 500], "fps": 25.0},
         input={"source": _archive(tmp_path, meshes)},
-        output={"meshes": tmp_path / "C.npy"},
+        output={"meshes": tmp_path / "C.npy", "quality": tmp_path / "quality.tsv"},
     )
-    assert np.array_equal(read_sequence(tmp_path / "C.npy"), meshes[3:5])
+    read = read_sequence(tmp_path / "C.npy")
+    assert np.array_equal(read[:2], meshes[3:5])
+    assert np.isnan(read[2]).all()
+    quality = read_table(tmp_path / "quality.tsv")
+    assert quality["valid"].tolist() == [1, 1, 0]
+    assert "not in other.npz; export this frame again" in quality["reason"].iloc[2]
     run_script(
         "tracking/tracked_topology",
         wildcards={"subject": "s", "take": "t"},
-        params={"cfg": {"tracking.external": {"unit_mm": None}}, "first": 3},
+        params={"cfg": CFG_EXTERNAL, "frames": [-1, 3, 4], "fps": 25.0},
         input={"source": tmp_path / "other.npz"},
         output={0: tmp_path / "topology.ply"},
     )

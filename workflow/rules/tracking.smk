@@ -400,6 +400,7 @@ rule tracked_meshes:
         source=source_of,
     output:
         meshes=P.coarse,
+        quality=P.tracking_quality,
     log:
         P.log("tracked_meshes", "chunk"),
     benchmark:
@@ -437,7 +438,7 @@ rule tracked_topology:
     params:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_topology"),
-        first=first_frame,
+        frames=lambda wildcards: list(take_of(wildcards).frames),
         fps=take_fps,
     script:
         "../scripts/tracking/tracked_topology.py"

@@ -2,14 +2,26 @@
 
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
+from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.tracking.external.read import read_tracked
 
 
+def first_mesh(source, frames, **options):
+    """The first of the frames that can be read."""
+    for frame in frames:
+        try:
+            return read_tracked(source, [frame], **options)
+        except InputError as error:
+            print(error)
+            problem = error
+    raise problem
+
+
 def main(snakemake):
-    sequence = read_tracked(
+    sequence = first_mesh(
         snakemake.input.source,
-        [snakemake.params.first],
+        snakemake.params.frames,
         **snakemake.params.cfg["tracking.external"],
         fps=snakemake.params.fps,
         subject=snakemake.wildcards.subject,
