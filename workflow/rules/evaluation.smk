@@ -221,6 +221,13 @@ rule guided_evaluate:
             labels={"take": "{subject}/{take}"},
             caption="../report/figure11.rst",
         ),
+        sheet=report(
+            P.guided_sheet,
+            category="Errors",
+            subcategory="Guided correction",
+            labels={"take": "{subject}/{take}, maps"},
+            caption="../report/figure12.rst",
+        ),
     log:
         P.log("guided_evaluate", "take"),
     benchmark:

@@ -166,6 +166,7 @@ class P:
     ablations = _EVALUATION + "/ablations.tsv"
     guided_measures = _EVALUATION + "/guided/{subject}/{take}/measures.tsv"
     guided_figure = _EVALUATION + "/guided/{subject}/{take}/figure11.png"
+    guided_sheet = _EVALUATION + "/guided/{subject}/{take}/figure12.png"
 
     # apply
     applied = _APPLY

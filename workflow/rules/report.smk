@@ -67,8 +67,9 @@ def stage_overlays():
         for frame in person_corrections(take)
     ]
     rows += [
-        ["guided", f"{take.name}, figure 11", fill(P.guided_figure, take)]
+        ["guided", f"{take.name}, {name}", fill(pattern, take)]
         for take in studied_takes()
+        for name, pattern in (("figure 11", P.guided_figure), ("figures 10, 12", P.guided_sheet))
     ]
     shown.append(("guided", "", P.guided_chunk_overlay, sketched_takes()))
     return rows + [

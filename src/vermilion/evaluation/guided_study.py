@@ -65,6 +65,7 @@ class PropagationStudy:
 
     Attributes:
         take_mm: (F, V, 3), any rigid poses.
+        regions: of the topology.
         propagator: of the topology.
         deformation: (F, D) of `mouth_deformation`, from which frames are chosen.
         size_mm: (F,) mean distance of the inner lips' free vertices from the neutral, aligned.
@@ -85,7 +86,7 @@ class PropagationStudy:
             regions: of the topology.
             stable: (s,) vertices that hold the alignment.
         """
-        self.take_mm, self._regions = take_mm, regions
+        self.take_mm, self.regions = take_mm, regions
         self.propagator = LipPropagator(neutral_mm, regions, stable)
         self.deformation = mouth_deformation(take_mm, neutral_mm, regions, stable)
         weights = np.zeros(len(neutral_mm))
@@ -99,7 +100,7 @@ class PropagationStudy:
         """Train on some frames (k,) and predict all."""
         self.propagator.fit(self.take_mm[frames], with_neutral=with_neutral)
         found = self.propagator.correct(self.take_mm).vertices_mm
-        free = self._regions.free
+        free = self.regions.free
         error = np.linalg.norm(found[:, free] - self.take_mm[:, free], axis=2).mean(axis=1)
         gradient = [
             np.linalg.norm(np.subtract(*self._gradients.gradients(np.stack(pair))))
@@ -108,6 +109,11 @@ class PropagationStudy:
         others = np.ones(len(found), dtype=bool)
         others[frames] = False
         return Left(found, error, np.array(gradient), others)
+
+    def predicted(self, frames: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Meshes (n, V, 3) of some rows (n,) when some frames (k,) train."""
+        self.propagator.fit(self.take_mm[frames])
+        return self.propagator.correct(self.take_mm[rows]).vertices_mm
 
     def ratio(self, left: Left) -> float:
         """Share of the inner lips' deformation that is left, over the frames that did not train."""

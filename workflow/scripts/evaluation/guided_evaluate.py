@@ -10,9 +10,13 @@ from vermilion.faces.model import FaceModel
 from vermilion.guided.regions import regions_of_face
 from vermilion.multiview.files import read_neutral
 from vermilion.report.guided_curve import draw_guided_curve
+from vermilion.report.guided_sheet import draw_guided_sheet
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
+
+#: Corrected frames of figure 12.
+SHEET_COUNTS = (1, 3, 5, 10)
 
 
 def neutral_of(inputs, n_vertices):
@@ -42,6 +46,8 @@ def main(snakemake):
     table = study_rows(study, clips, place, plan, resampling)
     print(table.to_string())
     write_table(out.measures, table)
+    counts = [count for count in SHEET_COUNTS if count < len(usable) // 2]
+    print(f"Hausdorff distances, mm: {draw_guided_sheet(study, counts, stable, out.sheet)}")
     draw_guided_curve(table, f"{'/'.join(place)}: {len(usable)} frames", out.figure)
 
 
