@@ -102,6 +102,7 @@ WITHOUT_SECTION = {
     "evaluation.drawn_sketch.Hand": "who draws in an evaluation: 1 px, as the bars say",
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
     "geometry.registration.Schedule": "by default the search distance stays; scans shrink it",
+    "guided.prior_refinement.HandNoise": "how strokes err; a sketch has no configuration",
     "guided.refinement.RefinementSettings": "Guided18's weights; a sketch has no configuration",
     "imaging.colour.VideoColour": "what a video without tags has: sRGB primaries",
     "imaging.presentation.Presentation": "what a video without tags has: square pixels, no HDR",
