@@ -75,6 +75,10 @@ rule regressors:
         regressor_outputs(),
 
 
+onstart:
+    refuse_impossible_jobs()
+
+
 onsuccess:
     record_checksums()
 

@@ -124,8 +124,8 @@ rule apply:
     benchmark:
         P.benchmark("apply", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("apply.overlay", "correction.integration", "correction.image", *MASK_KEYS),
         code=code_of("apply/apply"),
@@ -153,8 +153,8 @@ rule apply_export:
     benchmark:
         P.benchmark("apply_export", "take")
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),
@@ -191,8 +191,8 @@ rule lips_page:
     benchmark:
         P.benchmark("lips_page", "take")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         code=code_of("apply/lips_page"),
         fps=take_fps,
@@ -220,8 +220,8 @@ rule makeup:
     benchmark:
         P.benchmark("makeup", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("apply.makeup", "apply.overlay"),
         code=code_of("apply/makeup"),
@@ -246,8 +246,8 @@ rule makeup_join:
         P.benchmark("makeup_join", "take")
     localrule: True
     resources:
-        mem_mb=500,
-        runtime=20,
+        mem_mb=growing(500),
+        runtime=growing(20),
     params:
         code=code_of("apply/makeup_join"),
     script:

@@ -70,8 +70,8 @@ rule video_facts:
     benchmark:
         P.benchmark("video_facts", "take")
     resources:
-        mem_mb=400,
-        runtime=30,
+        mem_mb=growing(400),
+        runtime=growing(30),
     params:
         code=code_of("capture/video_facts"),
     script:
@@ -92,8 +92,8 @@ rule capture:
     benchmark:
         P.benchmark("capture", "chunk")
     resources:
-        mem_mb=800,
-        runtime=60,
+        mem_mb=growing(800),
+        runtime=growing(60),
     params:
         cfg=cfg_of("capture.manifest"),
         code=code_of("capture/capture"),
@@ -120,8 +120,8 @@ rule cameras:
     benchmark:
         P.benchmark("cameras", "take")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("capture.calibration", "capture.refinement"),
         code=code_of("capture/cameras"),

@@ -39,6 +39,7 @@ SCRIPTS = Path(workflow.basedir) / "workflow" / "scripts"
 
 
 include: "paths.smk"
+include: "resources.smk"
 
 
 _TAKES = {take.name: take for take in TAKES}

@@ -42,8 +42,8 @@ rule contour_detector:
     benchmark:
         P.benchmark("contour_detector", "take")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("contours.detector"),
         code=code_of("contours/contour_detector"),
@@ -70,8 +70,8 @@ rule contours:
     benchmark:
         P.benchmark("contours", "chunk")
     resources:
-        mem_mb=1000,
-        runtime=60,
+        mem_mb=growing(1000),
+        runtime=growing(60),
     params:
         cfg=cfg_of("contours.maps"),
         code=code_of("contours/contours"),

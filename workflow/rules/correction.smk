@@ -20,8 +20,8 @@ rule layers:
     benchmark:
         P.benchmark("layers", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         cfg=cfg_of("correction.layers"),
         code=code_of("correction/layers"),
@@ -74,8 +74,8 @@ rule neutral_pair:
     benchmark:
         P.benchmark("neutral_pair", "take")
     resources:
-        mem_mb=1000,
-        runtime=20,
+        mem_mb=growing(1000),
+        runtime=growing(20),
     params:
         cfg=cfg_of("correction.layers"),
         code=code_of("correction/neutral_pair"),

@@ -36,8 +36,8 @@ rule correspondence:
     benchmark:
         P.benchmark("correspondence", "subject")
     resources:
-        mem_mb=1000,
-        runtime=20,
+        mem_mb=growing(1000),
+        runtime=growing(20),
     params:
         cfg=cfg_of("correspondence"),
         code=code_of("correspondence/correspondence"),

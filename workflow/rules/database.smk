@@ -27,8 +27,8 @@ rule database:
     benchmark:
         P.benchmark("database", "run")
     resources:
-        mem_mb=4000,
-        runtime=60,
+        mem_mb=growing(4000),
+        runtime=growing(60),
     params:
         cfg=cfg_of("database"),
         code=code_of("database/database"),

@@ -72,8 +72,8 @@ rule detail_flow:
     benchmark:
         P.benchmark("detail_flow", "chunk")
     resources:
-        mem_mb=2000,
-        runtime=120,
+        mem_mb=growing(2000),
+        runtime=growing(30, for_each_frame=0.3),
     params:
         cfg=cfg_of("detail.face_px", "detail.flow", "detail.deformation", "detail.overlay_frames"),
         code=code_of("detail/detail_flow"),
@@ -99,8 +99,8 @@ rule relief_light:
     benchmark:
         P.benchmark("relief_light", "take")
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cfg=cfg_of(
             "detail.relief.levels",
@@ -130,8 +130,8 @@ rule relief:
     benchmark:
         P.benchmark("relief", "chunk")
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=growing(2000),
+        runtime=growing(60),
     params:
         cfg=cfg_of(
             "detail.relief.levels",
@@ -171,8 +171,8 @@ rule relief_meshes:
     benchmark:
         P.benchmark("relief_meshes", "chunk")
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=growing(2000),
+        runtime=growing(60),
     params:
         cfg=cfg_of(
             "detail.relief.levels",

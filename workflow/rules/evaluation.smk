@@ -97,8 +97,8 @@ rule lip_shapes:
     benchmark:
         P.benchmark("lip_shapes", "run")
     resources:
-        mem_mb=3000,
-        runtime=30,
+        mem_mb=growing(3000),
+        runtime=growing(30),
     params:
         cfg=cfg_of("evaluation.contour"),
         code=code_of("evaluation/lip_shapes"),
@@ -141,8 +141,8 @@ rule evaluate:
     benchmark:
         P.benchmark("evaluate", "take")
     resources:
-        mem_mb=3000,
-        runtime=120,
+        mem_mb=growing(3000),
+        runtime=growing(20, for_each_frame=0.05),
     params:
         cfg=cfg_of(
             "evaluation.reference",
@@ -176,8 +176,8 @@ rule evaluate_reconstruction:
     benchmark:
         P.benchmark("evaluate_reconstruction", "take")
     resources:
-        mem_mb=3000,
-        runtime=120,
+        mem_mb=growing(3000),
+        runtime=growing(20, for_each_frame=0.05),
     params:
         cfg=cfg_of("evaluation.reference", "evaluation.measures"),
         code=code_of("evaluation/evaluate_reconstruction"),
@@ -233,8 +233,8 @@ rule guided_evaluate:
     benchmark:
         P.benchmark("guided_evaluate", "take")
     resources:
-        mem_mb=4000,
-        runtime=120,
+        mem_mb=growing(4000),
+        runtime=growing(20, for_each_frame=0.05),
     params:
         cfg=cfg_of("guided.regions", "guided.study", "evaluation.measures"),
         code=code_of("evaluation/guided_evaluate"),
@@ -282,8 +282,8 @@ rule evaluation_figures:
     benchmark:
         P.benchmark("evaluation_figures", "take")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         cfg=cfg_of("evaluation.figures"),
         code=code_of("evaluation/evaluation_figures"),
@@ -327,8 +327,8 @@ rule measures:
     benchmark:
         P.benchmark("measures", "run")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         cfg=cfg_of("evaluation.measures", "training.regressor"),
         code=code_of("evaluation/measures"),

@@ -11,8 +11,8 @@ rule face_archive:
         P.benchmark("face_archive", "run")
     localrule: True
     resources:
-        mem_mb=500,
-        runtime=60,
+        mem_mb=growing(500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("face_model.url", "face_model.sha256"),
         code=code_of("face_model/face_archive"),
@@ -38,8 +38,8 @@ rule face_model:
         P.log("face_model", "run"),
     cache: True
     resources:
-        mem_mb=3000,
-        runtime=20,
+        mem_mb=growing(3000),
+        runtime=growing(20),
     params:
         cfg=cfg_of("face_model"),
         code=code_of("face_model/face_model"),

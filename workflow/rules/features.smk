@@ -21,8 +21,8 @@ rule features:
     benchmark:
         P.benchmark("features", "chunk")
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         cfg=cfg_of("features.shape", "features.contours"),
         code=code_of("features/features"),

@@ -99,8 +99,8 @@ rule guided_suggest:
     benchmark:
         P.benchmark("guided_suggest", "take")
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cfg=cfg_of("guided.regions", "guided.suggestion"),
         code=code_of("guided/guided_suggest"),
@@ -127,8 +127,8 @@ rule guided_refine:
     benchmark:
         P.benchmark("guided_refine", "frame")
     resources:
-        mem_mb=1500,
-        runtime=10,
+        mem_mb=growing(1500),
+        runtime=growing(10),
     params:
         cfg=cfg_of("guided.regions", "guided.refinement", "guided.contact"),
         code=code_of("guided/guided_refine"),
@@ -154,8 +154,8 @@ rule guided_train:
     benchmark:
         P.benchmark("guided_train", "take")
     resources:
-        mem_mb=2000,
-        runtime=20,
+        mem_mb=growing(2000),
+        runtime=growing(20),
     params:
         cfg=cfg_of(
             "guided.regions",
@@ -188,8 +188,8 @@ rule guided_correct:
     benchmark:
         P.benchmark("guided_correct", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("apply.overlay", "guided.contact", "guided.propagation.novelty_limit"),
         code=code_of("guided/guided_correct"),
@@ -218,8 +218,8 @@ rule guided_export:
     benchmark:
         P.benchmark("guided_export", "take")
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),

@@ -26,8 +26,8 @@ rule plain_texture:
     benchmark:
         P.benchmark("plain_texture", "subject")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         cfg=cfg_of("inpaint.domain", "capture.frontal_camera"),
         code=code_of("inpaint/plain_texture"),
@@ -54,8 +54,8 @@ rule inpaint_reference:
     benchmark:
         P.benchmark("inpaint_reference", "take")
     resources:
-        mem_mb=1500,
-        runtime=20,
+        mem_mb=growing(1500),
+        runtime=growing(20),
     params:
         cfg=cfg_of("inpaint.domain", "inpaint.mask", "capture.frontal_camera"),
         code=code_of("inpaint/inpaint_reference"),
@@ -83,8 +83,8 @@ rule inpaint:
     benchmark:
         P.benchmark("inpaint", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=lambda wildcards: 10 + len(frames_in(wildcards.chunk)) // 10,
+        mem_mb=growing(1500),
+        runtime=growing(10, for_each_frame=0.1),
     params:
         cfg=cfg_of(
             "inpaint.domain",

@@ -102,8 +102,8 @@ rule landmark_model:
         P.log("landmark_model", "run"),
     cache: True
     resources:
-        mem_mb=2500,
-        runtime=60,
+        mem_mb=growing(2500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("landmarks.training"),
         code=code_of("landmarks/landmark_model"),
@@ -149,8 +149,8 @@ rule landmarks_faces:
     benchmark:
         P.benchmark("landmarks_faces", "chunk")
     resources:
-        mem_mb=1000,
-        runtime=60,
+        mem_mb=growing(1000),
+        runtime=growing(60),
     params:
         cfg=detector_cfg("landmarks.csv"),
         code=code_of("landmarks/landmarks_faces"),
@@ -179,8 +179,8 @@ rule landmarks_followed:
     benchmark:
         P.benchmark("landmarks_followed", "take")
     resources:
-        mem_mb=lambda wildcards: 500 + len(take_of(wildcards).frames) // 20,
-        runtime=10,
+        mem_mb=growing(500, for_each_frame=0.05),
+        runtime=growing(10),
     params:
         cfg=cfg_of("landmarks.following"),
         code=code_of("landmarks/landmarks_followed"),
@@ -205,8 +205,8 @@ rule landmarks:
     benchmark:
         P.benchmark("landmarks", "chunk")
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         code=code_of("landmarks/landmarks"),
         source=chunk_source,
@@ -232,8 +232,8 @@ if CONFIG.landmarks.correction.mode == "flow":
         benchmark:
             P.benchmark("landmarks_key_frames", "take")
         resources:
-            mem_mb=1000,
-            runtime=60,
+            mem_mb=growing(1000),
+            runtime=growing(60),
         params:
             cfg=cfg_of("landmarks.key_frames", "landmarks.correction"),
             code=code_of("landmarks/landmarks_key_frames"),
@@ -257,8 +257,8 @@ if CONFIG.landmarks.correction.mode == "flow":
         benchmark:
             P.benchmark("landmarks_corrected", "chunk")
         resources:
-            mem_mb=1000,
-            runtime=120,
+            mem_mb=growing(1000),
+            runtime=growing(20, for_each_frame=0.2),
         params:
             cfg=cfg_of("landmarks.correction"),
             code=code_of("landmarks/landmarks_corrected"),
@@ -283,8 +283,8 @@ rule landmarks_views:
     benchmark:
         P.benchmark("landmarks_views", "take")
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=growing(1000),
+        runtime=growing(30),
     params:
         cfg=detector_cfg("landmarks.csv"),
         code=code_of("landmarks/landmarks_views"),

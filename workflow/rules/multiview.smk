@@ -90,8 +90,8 @@ rule multiview_neutral:
     benchmark:
         P.benchmark("multiview_neutral", "take")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.neutral"),
         code=code_of("multiview/multiview_neutral"),
@@ -116,8 +116,8 @@ rule multiview_anchor:
     benchmark:
         P.benchmark("multiview_anchor", "clip")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview/multiview_anchor"),
@@ -143,8 +143,8 @@ rule multiview_clip:
     benchmark:
         P.benchmark("multiview_clip", "clip")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview/multiview_clip"),
@@ -169,8 +169,8 @@ rule multiview_track:
     benchmark:
         P.benchmark("multiview_track", "take")
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=growing(2000),
+        runtime=growing(10),
     params:
         code=code_of("multiview/multiview_track"),
     script:
@@ -196,8 +196,8 @@ rule multiview_refine:
     benchmark:
         P.benchmark("multiview_refine", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.refine"),
         code=code_of("multiview/multiview_refine"),
@@ -224,8 +224,8 @@ rule multiview_drift:
     benchmark:
         P.benchmark("multiview_drift", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("multiview.images", "multiview.drift"),
         code=code_of("multiview/multiview_drift"),
@@ -266,8 +266,8 @@ rule multiview_report:
     benchmark:
         P.benchmark("multiview_report", "take")
     resources:
-        mem_mb=2000,
-        runtime=30,
+        mem_mb=growing(2000),
+        runtime=growing(30),
     params:
         cfg=cfg_of(
             "multiview.images",

@@ -119,8 +119,8 @@ rule quality:
     benchmark:
         P.benchmark("quality", "run")
     resources:
-        mem_mb=1000,
-        runtime=20,
+        mem_mb=growing(1000),
+        runtime=growing(20),
     params:
         code=code_of("report/quality"),
         skipped=[
@@ -168,8 +168,8 @@ rule summary:
     benchmark:
         P.benchmark("summary", "run")
     resources:
-        mem_mb=2000,
-        runtime=20,
+        mem_mb=growing(2000),
+        runtime=growing(20),
     params:
         cfg=cfg_of(
             "evaluation.figures.embed_video_mb",

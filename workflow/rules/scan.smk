@@ -28,8 +28,8 @@ rule scan:
     benchmark:
         P.benchmark("scan", "subject")
     resources:
-        mem_mb=3000,
-        runtime=30,
+        mem_mb=growing(3000),
+        runtime=growing(30),
     params:
         cfg=lambda wildcards: {
             "scan": scan_of(wildcards).model_dump(mode="json"),

@@ -148,8 +148,8 @@ for take in [take for take in TAKES if take.source == STUDIO]:
         benchmark:
             fill(P.benchmark("studio_rig", "take"), take)
         resources:
-            mem_mb=1500 + len(take.frames),
-            runtime=30,
+            mem_mb=growing(1500 + len(take.frames)),
+            runtime=growing(30),
         params:
             cfg={
                 "plan": studio_plan(take),
@@ -178,8 +178,8 @@ for take in [take for take in TAKES if take.source == STUDIO]:
             benchmark:
                 fill(P.benchmark("studio_take", "chunk"), take, chunk=chunk)
             resources:
-                mem_mb=1500,
-                runtime=5 + len(frames_in(chunk)),
+                mem_mb=growing(1500),
+                runtime=growing(5 + len(frames_in(chunk))),
             params:
                 cfg={
                     "plan": studio_plan(take),

@@ -63,8 +63,8 @@ rule identity:
     benchmark:
         P.benchmark("identity", "subject")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
         code=code_of("tracking/identity"),
@@ -93,8 +93,8 @@ rule image_identity:
     wildcard_constraints:
         subject=one_of(image_identity_subjects()),
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
         code=code_of("tracking/image_identity"),
@@ -134,8 +134,8 @@ rule tracking:
     benchmark:
         P.benchmark("tracking", "take")
     resources:
-        mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
-        runtime=60,
+        mem_mb=growing(1000, for_each_frame=2),
+        runtime=growing(60),
     params:
         cfg=cfg_of("tracking.fit", "tracking.motion"),
         code=code_of("tracking/tracking"),
@@ -184,8 +184,8 @@ rule appearance:
     benchmark:
         P.benchmark("appearance", "take")
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of(
             "tracking.fit",
@@ -215,8 +215,8 @@ rule image_fit:
     benchmark:
         P.benchmark("image_fit", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of(
             "tracking.fit",
@@ -249,8 +249,8 @@ if CONFIG.tracking.image_fit.enabled:
         benchmark:
             P.benchmark("image_fit_join", "take")
         resources:
-            mem_mb=lambda wildcards: 1000 + 2 * len(take_of(wildcards).frames),
-            runtime=60,
+            mem_mb=growing(1000, for_each_frame=2),
+            runtime=growing(60),
         params:
             cfg=cfg_of("tracking.fit", "tracking.motion", "tracking.image_fit.join"),
             code=code_of("tracking/image_fit_join"),
@@ -275,8 +275,8 @@ rule offsets:
     benchmark:
         P.benchmark("offsets", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of(
             "tracking.fit", "tracking.motion", "tracking.image_fit.appearance", "tracking.offsets"
@@ -307,8 +307,8 @@ rule residuals:
     benchmark:
         P.benchmark("residuals", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of(
             "tracking.fit",
@@ -336,8 +336,8 @@ rule ablations:
         P.benchmark("ablations", "run")
     localrule: True
     resources:
-        mem_mb=500,
-        runtime=10,
+        mem_mb=growing(500),
+        runtime=growing(10),
     params:
         code=code_of("tracking/ablations"),
     script:
@@ -362,8 +362,8 @@ rule tracking_meshes:
     benchmark:
         P.benchmark("tracking_meshes", "chunk")
     resources:
-        mem_mb=1500,
-        runtime=60,
+        mem_mb=growing(1500),
+        runtime=growing(60),
     params:
         cfg=cfg_of("tracking.meshes"),
         code=code_of("tracking/tracking_meshes"),
@@ -386,8 +386,8 @@ rule tracking_topology:
         P.benchmark("tracking_topology", "take")
     localrule: True
     resources:
-        mem_mb=500,
-        runtime=10,
+        mem_mb=growing(500),
+        runtime=growing(10),
     params:
         code=code_of("tracking/tracking_topology"),
     script:
@@ -408,8 +408,8 @@ rule tracked_meshes:
     wildcard_constraints:
         take=one_of(take.take for take in takes("tracked")),
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_meshes"),
@@ -433,8 +433,8 @@ rule tracked_topology:
         take=one_of(take.take for take in takes("tracked")),
     localrule: True
     resources:
-        mem_mb=1500,
-        runtime=30,
+        mem_mb=growing(1500),
+        runtime=growing(30),
     params:
         cfg=cfg_of("tracking.external"),
         code=code_of("tracking/tracked_topology"),

@@ -29,8 +29,8 @@ rule train:
     benchmark:
         P.benchmark("train", "regressor")
     resources:
-        mem_mb=4000,
-        runtime=60,
+        mem_mb=growing(4000),
+        runtime=growing(60),
     params:
         cfg=cfg_of("training"),
         code=code_of("training/train"),
