@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import adjacency
 from vermilion.imaging.draw import label
-from vermilion.imaging.shaded_mesh import shade
+from vermilion.imaging.shaded_mesh import ShadedMesh
 from vermilion.storage.files import atomic_path
 
 SKIN = (0.80, 0.79, 0.77)
@@ -152,16 +152,22 @@ def overlay_image(
         caption: written into the first panel (take, frame).
     """
     rows: list[np.ndarray] = []
+    drawn = [
+        ShadedMesh(np.asarray(vertices, dtype=float), triangles, colours)
+        if vertices is not None and np.isfinite(vertices).all()
+        else None
+        for _, vertices in meshes
+    ]
     for crop in crops:
         original, near = crop.of_image(image), crop.of_camera(camera)
+        rays = near.rays(near.pixel_grid())
         panels, names = [original], [caption]
-        for name, vertices in meshes:
-            tracked = vertices is not None and np.isfinite(vertices).all()
-            names.append(name if tracked else f"{name}: not tracked")
-            if tracked:
-                points = np.asarray(vertices, dtype=float)
-                panels.append(shade(original, near, points, triangles, colours, opacity))
+        for (name, _), mesh in zip(meshes, drawn, strict=True):
+            if mesh is not None:
+                names.append(name)
+                panels.append(mesh.over(original, near, rays, opacity))
             else:
+                names.append(f"{name}: not tracked")
                 panels.append(original // 2)
         if not rows:
             panels = [label(*pair) for pair in zip(panels, names, strict=True)]

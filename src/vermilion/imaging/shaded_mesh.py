@@ -36,17 +36,50 @@ def shade(
     Returns:
         (h, w, 3) uint8.
     """
-    origins, directions = camera.rays(camera.pixel_grid())
-    hits = RayCaster(vertices_mm, triangles).cast(origins, directions)
-    normals = vertex_normals(vertices_mm, triangles) @ camera.rotation.T
-    local = np.ascontiguousarray(directions.reshape(-1, 3) @ camera.rotation.T)
-    result = np.ascontiguousarray(image).copy()
-    _shade(
-        hits.triangle.ravel(), hits.barycentric.reshape(-1, 3), local,
-        np.ascontiguousarray(triangles), np.ascontiguousarray(normals),
-        np.ascontiguousarray(colours, dtype=np.float64), float(opacity), result.reshape(-1, 3),
-    )  # fmt: skip
-    return result
+    rays = camera.rays(camera.pixel_grid())
+    return ShadedMesh(vertices_mm, triangles, colours).over(image, camera, rays, opacity)
+
+
+class ShadedMesh:
+    """A mesh that is drawn into several images; its scene and normals are made once.
+
+    Args:
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        colours: (V, 3) in [0, 1].
+    """
+
+    def __init__(self, vertices_mm: np.ndarray, triangles: np.ndarray, colours: np.ndarray):
+        self._caster = RayCaster(vertices_mm, triangles)
+        self._normals = vertex_normals(vertices_mm, triangles)
+        self._triangles = np.ascontiguousarray(triangles)
+        self._colours = np.ascontiguousarray(colours, dtype=np.float64)
+
+    def over(
+        self,
+        image: np.ndarray,
+        camera: Camera,
+        rays: tuple[np.ndarray, np.ndarray],
+        opacity: float,
+    ) -> np.ndarray:
+        """The mesh over an image, (h, w, 3) uint8.
+
+        Args:
+            image: (h, w, 3) uint8.
+            camera: of the image.
+            rays: origins and directions of its pixels, both (h, w, 3), as `Camera.rays` gives them.
+            opacity: 0 to 1.
+        """
+        origins, directions = rays
+        hits = self._caster.cast(origins, directions)
+        local = np.ascontiguousarray(directions.reshape(-1, 3) @ camera.rotation.T)
+        result = np.ascontiguousarray(image).copy()
+        _shade(
+            hits.triangle.ravel(), hits.barycentric.reshape(-1, 3), local, self._triangles,
+            np.ascontiguousarray(self._normals @ camera.rotation.T), self._colours, float(opacity),
+            result.reshape(-1, 3),
+        )  # fmt: skip
+        return result
 
 
 @numba.njit(cache=True)
