@@ -136,6 +136,49 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
         assert residual[1] < 0.5 * residual[0]
 
 
+def test_a_change_of_exposure_moves_nothing(scene):
+    truth, off, samples, appearance = scene
+    start = take_start(MODEL, truth, off)
+    face = start.face(samples)
+    image = image_of(MODEL, mesh_of(MODEL, truth[0]))
+    problem = FrameProblem(face, appearance, SETTINGS, 0.5)
+    fits = [
+        problem.solve(start.view(0, image * np.float32(gain), face, 1.0, len(SETTINGS.iterations)))
+        for gain in (1.0, 0.6)
+    ]
+    assert fits[0].gain == pytest.approx(1.0, abs=0.02)
+    assert fits[1].gain == pytest.approx(0.6 * fits[0].gain, rel=0.01)
+    moved = take_positions(start, np.stack([fit.x for fit in fits]))
+    assert np.linalg.norm(moved[1] - moved[0], axis=1).mean() < 0.1  # px
+    view = start.view(0, image * np.float32(0.6), face, 1.0, 1)
+    errors, trust, _ = sample_errors(view, fits[1].x, face, appearance)
+    assert photometric_residual(errors, trust) < 3.0
+
+
+def test_frames_of_varying_exposure_give_one_appearance(scene):
+    truth, _, samples, _ = scene
+    start = take_start(MODEL, truth, truth)
+    face = start.face(samples)
+    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
+    gains = np.linspace(0.7, 1.4, len(truth))
+
+    def learnt(factors):
+        views = [
+            start.view(row, image * np.float32(factor), face, 1.0, len(SETTINGS.iterations))
+            for row, (image, factor) in enumerate(zip(images, factors, strict=True))
+        ]
+
+        def problem_of(found):
+            return FrameProblem(face, found, SETTINGS, 0.5)
+
+        return learn_appearance(np.arange(len(views)), views, face, samples, 0.2, 2, problem_of)
+
+    even, varied = learnt(np.ones(len(truth))), learnt(gains)
+    sure = (even.seen > 1.0) & (varied.seen > 1.0)
+    ratio = (varied.albedo[0] / even.albedo[0])[sure]
+    assert np.abs(ratio / np.median(ratio) - 1).mean() < 0.02
+
+
 def take_positions(start, x):
     return np.stack([1200.0 * v[:, :2] / v[:, 2:] for v in (start.vertices(row) for row in x)])
 

@@ -5,12 +5,14 @@ Minimises, over the rotation, the translation and the weights w in [0, 1],
     strength * mean over visible samples of rho(|display(image) - display(albedo * SH(normal))|)
     + the landmark terms and |w|^2 / weight_sigma^2 of the landmark fit
     + |x - x_landmarks|^2 over the squared typical change from the landmark fit
+
+The model's colours are multiplied by the frame's gain: a camera may change its exposure.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +28,9 @@ from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
+
+#: Logarithm of the largest change of exposure that is believed.
+_LARGEST_GAIN = 1.5
 
 
 @dataclass(frozen=True)
@@ -81,20 +86,23 @@ class FrameFit:
         x: (6 + K,) rotation vector, translation, weights.
         matrix: (6 + K, 6 + K) A.
         right: (6 + K,) b.
+        gain: brightness of the frame over that of the appearance.
     """
 
     x: np.ndarray
     matrix: np.ndarray
     right: np.ndarray
+    gain: float = 1.0
 
 
 @dataclass(frozen=True)
 class _VisibleSamples:
-    """The n samples that one frame shows: face, albedo (L, n, 3), trust (n,)."""
+    """The n samples that one frame shows: face, albedo (L, n, 3) times the frame's gain, trust (n,)."""
 
     face: SampledFace
     albedo: np.ndarray
     trust: np.ndarray
+    gain: float = 1.0
 
 
 class FrameProblem:
@@ -130,7 +138,7 @@ class FrameProblem:
         none = np.zeros((0, len(x)))
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
             # Coarse images need fewer samples.
-            part = self._visible(view, 2**level)
+            part = self._exposed(self._visible(view, 2**level), x, view, level)
             cost = self._cost(x, view, level, part)
             for _ in range(count):
                 matrix, right = self._normal_equations(x, view, level, part)
@@ -150,7 +158,13 @@ class FrameProblem:
                     break
                 x, cost = trial, trial_cost
         matrix, right = self._normal_equations(x, view, 0, part)
-        return FrameFit(x, matrix, right)
+        return FrameFit(x, matrix, right, part.gain)
+
+    def _exposed(self, part: _VisibleSamples, x, view: FrameView, level: int) -> _VisibleSamples:
+        """The samples with the gain that explains the frame's brightness at x (6 + K,)."""
+        _, parts, weight = self._errors(x, view, level, part)
+        gain = exposure_gain(parts[-2], parts[-1], weight)
+        return replace(part, albedo=part.albedo * gain, gain=gain)
 
     def _visible(self, view: FrameView, every: int) -> _VisibleSamples:
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))[::every]
@@ -166,7 +180,8 @@ class FrameProblem:
         predicted = part.albedo[level] * irradiance(normals, self.appearance.light)
         error = to_display_values(found) - to_display_values(predicted)
         seen = display_slope(found)[..., None] * slopes
-        return error, (rotation, turned, points, normals, seen, predicted), part.trust * inside
+        parts = (rotation, turned, points, normals, seen, found, predicted)
+        return error, parts, part.trust * inside
 
     def _cost(self, x, view, level, part) -> float:
         error, _, weight = self._errors(x, view, level, part)
@@ -198,7 +213,7 @@ class FrameProblem:
 
     def _jacobian(self, x, view, level, part, parts) -> np.ndarray:
         """Derivative (n, 3, 6 + K) float32 of the errors."""
-        rotation, turned, points, normals, seen, predicted = parts
+        rotation, turned, points, normals, seen, _, predicted = parts
         turn = left_jacobian(x[:3])
         by_point = seen @ projection_jacobian(points, view.focal_px)
         by_rotation = by_point @ (-cross_matrix(turned) @ turn)
@@ -214,6 +229,24 @@ class FrameProblem:
         return np.concatenate(
             [by_rotation.astype(np.float32), by_point.astype(np.float32), by_weight], axis=2
         )
+
+
+def exposure_gain(found: np.ndarray, predicted: np.ndarray, trust: np.ndarray) -> float:
+    """By how much an image is brighter than the model: the median over the seen samples.
+
+    Args:
+        found, predicted: (n, 3) linear RGB of the image and of the model.
+        trust: (n,) in [0, 1].
+    """
+    light, model = found.sum(axis=1), predicted.sum(axis=1)
+    use = np.flatnonzero((trust > 0) & (light > 0) & (model > 0))
+    if not len(use):
+        return 1.0
+    ratio = np.log(light[use] / model[use])
+    order = np.argsort(ratio, kind="stable")
+    share = np.cumsum(trust[use][order])
+    middle = ratio[order][np.searchsorted(share, 0.5 * share[-1])]
+    return float(np.exp(np.clip(middle, -_LARGEST_GAIN, _LARGEST_GAIN)))
 
 
 def visible_trust(

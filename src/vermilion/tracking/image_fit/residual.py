@@ -8,7 +8,7 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.geometry.rotations import rotation_matrix
 from vermilion.imaging.display import to_display_values
-from vermilion.tracking.image_fit.frame_fit import FrameView
+from vermilion.tracking.image_fit.frame_fit import FrameView, exposure_gain
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project
 
@@ -20,7 +20,7 @@ def sample_errors(
     appearance: Appearance,
     offsets_mm: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image minus model at each sample, display values (0 to 255).
+    """Image minus model, at the frame's exposure, at each sample, display values (0 to 255).
 
     Args:
         view: the frame.
@@ -38,8 +38,9 @@ def sample_errors(
     image = project(points, view.focal_px)
     found, _, inside = view.levels[0].sample(image)
     predicted = appearance.colours(face.normals(x[N_POSE:]) @ rotation.T)
-    errors = to_display_values(found) - to_display_values(predicted)
-    return errors, view.trust * inside * (appearance.seen > 0), image
+    trust = view.trust * inside * (appearance.seen > 0)
+    predicted = predicted * exposure_gain(found, predicted, trust)
+    return to_display_values(found) - to_display_values(predicted), trust, image
 
 
 def photometric_residual(errors: np.ndarray, trust: np.ndarray) -> float:

@@ -172,15 +172,18 @@ class TakeStart:
 
 
 def observe_samples(
-    views: list[FrameView], xs: list[np.ndarray], face: SampledFace
+    views: list[FrameView], xs: list[np.ndarray], gains: np.ndarray, face: SampledFace
 ) -> SampleObservations:
-    """Colours of the samples in some frames, with poses and weights `xs`, each (6 + K,)."""
+    """Colours of the samples in some frames, with poses and weights `xs`, each (6 + K,).
+
+    They are divided by the frames' `gains` (M,): the exposure of the camera may change.
+    """
     colours, normals, trust = [], [], []
-    for view, x in zip(views, xs, strict=True):
+    for view, x, gain in zip(views, xs, gains, strict=True):
         rotation = rotation_matrix(x[:3]) @ view.reference
         image = project(face.points(x[N_POSE:]) @ rotation.T + x[3:6], view.focal_px)
         found = [level.sample(image) for level in view.levels]
-        colours.append(np.stack([values for values, _, _ in found]))
+        colours.append(np.stack([values for values, _, _ in found]) / gain)
         normals.append(face.normals(x[N_POSE:]) @ rotation.T)
         trust.append(view.trust * found[0][2])
     return SampleObservations(np.stack(colours), np.stack(normals), np.stack(trust))
@@ -206,11 +209,14 @@ def learn_appearance(
         rounds: of appearance, then poses and expressions.
         problem_of: the energy of a frame under an appearance.
     """
-    xs = [view.start for view in views]
+    xs, gains = [view.start for view in views], np.ones(len(views))
     for _ in range(rounds):
         appearance = estimate_appearance(
-            frames, samples, observe_samples(views, xs, face), albedo_prior
+            frames, samples, observe_samples(views, xs, gains, face), albedo_prior
         )
         problem = problem_of(appearance)
-        xs = [problem.solve(view).x for view in views]
-    return estimate_appearance(frames, samples, observe_samples(views, xs, face), albedo_prior)
+        fits = [problem.solve(view) for view in views]
+        xs, gains = [fit.x for fit in fits], np.array([fit.gain for fit in fits])
+        gains = gains / np.exp(np.log(gains).mean())  # nobody knows the light's own brightness
+    seen = observe_samples(views, xs, gains, face)
+    return estimate_appearance(frames, samples, seen, albedo_prior)
