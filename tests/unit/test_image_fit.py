@@ -1,11 +1,13 @@
 """Dense refinement on images of a painted dome, whose pose, expression and light are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from tests.unit.image_fit_scene import LIGHT, dome, image_of, mesh_of, motion, take_start
-from vermilion.appearance.estimate import SampleObservations, estimate_appearance
+from vermilion.appearance.estimate import Appearance, SampleObservations, estimate_appearance
 from vermilion.appearance.harmonics import harmonics, harmonics_jacobian, irradiance
 from vermilion.appearance.sampled_face import SampledFace
 from vermilion.appearance.samples import sample_skin
@@ -153,6 +155,28 @@ def test_a_change_of_exposure_moves_nothing(scene):
     view = start.view(0, image * np.float32(0.6), face, 1.0, 1)
     errors, trust, _ = sample_errors(view, fits[1].x, face, appearance)
     assert photometric_residual(errors, trust) < 3.0
+
+
+def test_each_piece_is_fitted_under_its_own_light(scene, tmp_path):
+    truth, off, samples, appearance = scene
+    start = take_start(MODEL, truth, off)
+    face = start.face(samples)
+    mirrored = appearance.light * np.array([1, 1, 1, -1, 1, 1, 1, 1, 1])[:, None]
+    wrong = replace(
+        appearance, light=0.3 * appearance.light + 0.2 * mirrored, albedo=appearance.albedo[:, ::-1]
+    )
+    appearance.save(tmp_path / "a.npz", {0: wrong, 1: appearance})
+    read = Appearance.load_pieces(tmp_path / "a.npz")
+    assert (
+        sorted(read) == [0, 1]
+        and (Appearance.load(tmp_path / "a.npz").light == read[1].light).all()
+    )
+    problems = {k: FrameProblem(face, found, SETTINGS, 0.5) for k, found in read.items()}
+    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
+    everything, piece = np.ones(N_FRAMES, dtype=bool), np.ones(N_FRAMES, dtype=np.int64)
+    chunk = FrameChunk(start, everything, wrong, face, lambda row: images[row], 1.0, piece)
+    alone = fit_frames(replace(chunk, piece=None), problems[1])
+    assert np.array_equal(fit_frames(chunk, problems)["x"], alone["x"])
 
 
 def test_frames_of_varying_exposure_give_one_appearance(scene):

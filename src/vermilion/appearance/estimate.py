@@ -8,8 +8,10 @@ the light is fitted to the mean of the albedo and the one colour.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -72,14 +74,30 @@ class Appearance:
         """Predicted linear RGB (N, 3) of samples with unit `normals` (N, 3), camera frame."""
         return self.albedo[level] * irradiance(normals, self.light)
 
-    def save(self, path: str | Path) -> None:
-        """Write `.npz`, whole or not at all."""
-        write_arrays(path, **{item.name: getattr(self, item.name) for item in fields(self)})
+    def save(self, path: str | Path, pieces: Mapping[int, Appearance] | None = None) -> None:
+        """Write `.npz`, whole or not at all, with the appearance of each piece of the take."""
+        others = {
+            f"piece/{number}/{item.name}": getattr(found, item.name)
+            for number, found in (pieces or {}).items()
+            for item in fields(found)
+        }
+        own: dict[str, Any] = {item.name: getattr(self, item.name) for item in fields(self)}
+        write_arrays(path, **own, **others)
 
     @classmethod
     def load(cls, path: str | Path) -> Appearance:
-        """Read what `save` wrote."""
+        """Read what `save` wrote: the appearance of the whole take, or of its longest piece."""
         return cls(**read_arrays(path, "appearance", [item.name for item in fields(cls)]))
+
+    @classmethod
+    def load_pieces(cls, path: str | Path) -> dict[int, Appearance]:
+        """Piece -> its appearance, where `save` wrote any."""
+        arrays = read_arrays(path, "appearance")
+        numbers = {int(name.split("/")[1]) for name in arrays if name.startswith("piece/")}
+        return {
+            number: cls(**{f.name: arrays[f"piece/{number}/{f.name}"] for f in fields(cls)})
+            for number in sorted(numbers)
+        }
 
 
 def estimate_appearance(

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames
 from vermilion.storage.arrays import write_arrays
 from vermilion.storage.logfile import log_to
@@ -15,8 +16,12 @@ def main(snakemake):
     chunk = FrameChunk.load(snakemake.input, source, cfg, params.frames)
     settings = FrameFitSettings(**cfg["tracking.image_fit.frame_fit"])
     sigmas = chunk.start.weight_sigmas
-    problem = FrameProblem(chunk.face, chunk.appearance, settings, sigmas)
-    write_arrays(snakemake.output[0], frames=np.array(params.frames), **fit_frames(chunk, problem))
+    own = Appearance.load_pieces(snakemake.input.appearance) or {0: chunk.appearance}
+    problems = {
+        number: FrameProblem(chunk.face, found, settings, sigmas) for number, found in own.items()
+    }
+    found = fit_frames(chunk, problems)
+    write_arrays(snakemake.output[0], frames=np.array(params.frames), **found)
 
 
 if __name__ == "__main__":

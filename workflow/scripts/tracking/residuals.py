@@ -24,6 +24,7 @@ def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     tracker, person = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
     track, appearance = LandmarkTrack.load(inputs.landmarks), Appearance.load(inputs.appearance)
+    own = Appearance.load_pieces(inputs.appearance)
     settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
     steps, starts = params.steps, {}
     for step in steps:
@@ -39,6 +40,7 @@ def main(snakemake):
     shown = set(evenly_spaced(len(rows), cfg["tracking.image_fit.overlay_frames"]).tolist())
     tables, sheet = {step: [] for step in steps}, []
     for index, frame in enumerate(params.frames):
+        appearance = own.get(int(fit.pieces[rows[index]]), appearance)
         try:
             image = source.read(fit.camera.name, int(frame)) if fit.valid[rows[index]] else None
         except InputError:

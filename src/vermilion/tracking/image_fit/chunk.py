@@ -30,10 +30,11 @@ class FrameChunk:
     Attributes:
         start: the frames before the image fit.
         valid: (F,) bool; the other frames are not looked at.
-        appearance: of the take.
+        appearance: of the take's longest piece between cuts.
         face: the person at the appearance's samples.
         read: row -> image (h, w, 3), linear RGB, or InputError.
         pixel_mm: pixel size of the finest images that are compared, at the face.
+        piece: (F,) int piece between cuts of each frame; None: all in one.
     """
 
     start: TakeStart
@@ -42,6 +43,7 @@ class FrameChunk:
     face: SampledFace
     read: Callable[[int], np.ndarray]
     pixel_mm: float
+    piece: np.ndarray | None = None
 
     @classmethod
     def load(
@@ -60,7 +62,7 @@ class FrameChunk:
 
         pixel_mm = cfg["tracking.image_fit.appearance"]["pixel_mm"]
         face = start.face(appearance.samples)
-        return cls(start, fit.valid[rows], appearance, face, read, pixel_mm)
+        return cls(start, fit.valid[rows], appearance, face, read, pixel_mm, fit.pieces[rows])
 
     def views(self, levels: int, name: str) -> Iterator[tuple[int, FrameView]]:
         """Row and data of every valid frame, with an image pyramid of `levels`.
@@ -76,8 +78,12 @@ class FrameChunk:
             yield row, self.start.view(row, image, self.face, self.pixel_mm, levels)
 
 
-def fit_frames(chunk: FrameChunk, problem: FrameProblem) -> dict[str, np.ndarray]:
+def fit_frames(
+    chunk: FrameChunk, problem: FrameProblem | Mapping[int, FrameProblem]
+) -> dict[str, np.ndarray]:
     """Fit pose and expression to the image of each frame.
+
+    Each piece between cuts has its own light and albedo, and so its own `problem`; one is that of all.
 
     Frames that are not valid, or whose image cannot be read, keep the landmark fit.
 
@@ -91,8 +97,12 @@ def fit_frames(chunk: FrameChunk, problem: FrameProblem) -> dict[str, np.ndarray
         "right": np.zeros((n_frames, n_params)),
         "refined": np.zeros(n_frames, dtype=bool),
     }
-    for row, view in chunk.views(len(problem.settings.iterations), "image fit"):
-        found = problem.solve(view)
+    any_problem = problem if isinstance(problem, FrameProblem) else next(iter(problem.values()))
+    for row, view in chunk.views(len(any_problem.settings.iterations), "image fit"):
+        own = any_problem
+        if not isinstance(problem, FrameProblem) and chunk.piece is not None:
+            own = problem.get(int(chunk.piece[row]), any_problem)
+        found = own.solve(view)
         result["x"][row], result["matrix"][row] = found.x, found.matrix
         result["right"][row], result["refined"][row] = found.right, True
     return result
