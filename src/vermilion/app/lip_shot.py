@@ -166,6 +166,10 @@ tracking:{person}
     # One clip has one light: fewer frames than for a whole study tell it.
     appearance: {{frames: 10, rounds: 3}}
 
+correction:
+  # Contours that start from these landmarks are good: the lips follow them closely.
+  image: {{contour_weight: 3.0}}
+
 apply:
   # `regressor: none` lets the lips follow the contours in the image; `model: FILE.h5` names a trained
   # regressor, which corrects them before.
