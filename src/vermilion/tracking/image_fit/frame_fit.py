@@ -92,7 +92,7 @@ class FrameFit:
     x: np.ndarray
     matrix: np.ndarray
     right: np.ndarray
-    gain: float = 1.0
+    gain: float
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class _VisibleSamples:
     face: SampledFace
     albedo: np.ndarray
     trust: np.ndarray
-    gain: float = 1.0
+    gain: float
 
 
 class FrameProblem:
@@ -168,7 +168,8 @@ class FrameProblem:
 
     def _visible(self, view: FrameView, every: int) -> _VisibleSamples:
         rows = np.flatnonzero((view.trust > 0) & (self.appearance.seen > 0))[::every]
-        return _VisibleSamples(self.face[rows], self.appearance.albedo[:, rows], view.trust[rows])
+        albedo = self.appearance.albedo[:, rows]
+        return _VisibleSamples(self.face[rows], albedo, view.trust[rows], 1.0)
 
     def _errors(self, x, view, level, part):
         """Image minus model (n, 3) display values, its intermediate results, and trust (n,)."""
