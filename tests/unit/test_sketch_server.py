@@ -13,7 +13,7 @@ pytest.importorskip("httpx2", reason="httpx2 is not installed: `make setup`")
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from tests.sketch_take import CAMERA, LOST, N_FRAMES, SUGGESTED, TAKE, make_take
+from tests.sketch_take import CAMERA, CHUNK, LOST, N_FRAMES, SUGGESTED, TAKE, make_take
 from tests.unit import guided_mouths as mouths
 from vermilion.app.sketch.desk import Desk
 from vermilion.app.sketch.packet import pack
@@ -23,6 +23,7 @@ from vermilion.app.sketch.server import STATIC, application
 from vermilion.app.sketch.sketch_store import NOTHING
 from vermilion.app.sketch.take_files import TakeFiles
 from vermilion.storage.errors import InputError
+from vermilion.storage.sequences import write_sequence
 
 PORT = 8765
 ADDRESS = f"http://127.0.0.1:{PORT}"
@@ -453,6 +454,23 @@ def test_progress_and_a_failed_job_are_read_from_what_the_workflow_prints(tmp_pa
     assert "guided_correct failed" in run._failure()
     assert run.log().startswith(str(log))
     assert run.log().endswith("found nothing")
+
+
+def test_a_take_that_does_not_follow_the_strokes_says_what_to_change(page, take):
+    page.put(f"/api/sketch/{CAMERA}/4", json={"revision": NOTHING, "sketch": drawn(take, 4)})
+    chunk = take.results / "takes" / "s" / "t" / "guided" / "chunks" / f"{CHUNK}.npy"
+    try:
+        write_sequence(chunk, take.base_mm)
+        status = page.get("/api/status").json()
+        assert status["propagated"] == list(range(N_FRAMES))
+        assert max(status["changed_mm"].values()) < 1e-4
+        assert "guided.regions.inner_mm (now 5)" in status["followed"]
+        write_sequence(chunk, take.true_mm)
+        status = page.get("/api/status").json()
+        assert status["followed"] == ""
+        assert min(status["changed_mm"].values()) > 0.1
+    finally:
+        chunk.unlink()
 
 
 # Opening -------------------------------------------------------------------------------------------

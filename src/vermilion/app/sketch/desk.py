@@ -38,7 +38,7 @@ class Desk:
         self._lines = LipLines(data.face, surface)
         self.solver = FrameSolver(data, surface, self.store)
         self.views = FrameViews(data, self._lines)
-        self.status = TakeStatus(data, self.store, self.solver)
+        self.status = TakeStatus(data, self.store, self.solver, self._lines)
         self.run = PropagationRun(files.configuration, files.targets, options or [])
 
     def description(self) -> dict[str, Any]:

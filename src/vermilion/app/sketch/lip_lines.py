@@ -8,8 +8,9 @@ from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.guided.curves import first_self_crossing, mouth_axes
+from vermilion.guided.refinement import RefinementSettings, View
 from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
-from vermilion.guided.sketch import CURVE_NAMES
+from vermilion.guided.sketch import CURVE_NAMES, Sketch
 
 #: A line of the mesh further from its silhouette than this share of the mouth is not its contour.
 _NEAR_SHARE = 0.15
@@ -54,6 +55,14 @@ class LipLines:
         moved = moved[keep]
         usable = len(moved) > 3 and first_self_crossing(moved) is None
         return moved if usable else line
+
+    def off_px(self, sketch: Sketch, vertices_mm: np.ndarray, camera: Camera) -> float:
+        """Mean distance of the strokes of a sketch from the contours of a mesh vertices_mm (V, 3), world."""
+        view = View.of(sketch, camera, RefinementSettings())
+        found = view.contours(vertices_mm, self._surface)
+        return float(
+            np.concatenate([found[name].nearest(view.samples[name])[1] for name in found]).mean()
+        )
 
 
 def _halves(face: FaceModel, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from vermilion.app.sketch.frame_solver import FrameSolver
+from vermilion.app.sketch.frame_solver import OFF_PX, FrameSolver
+from vermilion.app.sketch.lip_lines import LipLines
+from vermilion.app.sketch.refusal import RefusedRequest
 from vermilion.app.sketch.sketch_store import SketchStore
 from vermilion.app.sketch.take_data import TakeData
 from vermilion.app.sketch.take_files import existing
+from vermilion.storage.errors import VermilionError
 from vermilion.storage.quality import flagged_frames
 from vermilion.storage.sequences import frames_of, read_sequence
 from vermilion.storage.tables import read_table
@@ -19,8 +22,8 @@ from vermilion.storage.tables import read_table
 class TakeStatus:
     """Reads the take's tables again when their files have changed."""
 
-    def __init__(self, data: TakeData, store: SketchStore, solver: FrameSolver):
-        self._data, self._store, self._solver = data, store, solver
+    def __init__(self, data: TakeData, store: SketchStore, solver: FrameSolver, lines: LipLines):
+        self._data, self._store, self._solver, self._lines = data, store, solver, lines
         self._kept: dict[str, tuple[Any, Any]] = {}
 
     def report(self) -> dict[str, Any]:
@@ -44,6 +47,7 @@ class TakeStatus:
             "propagated": sorted(changed),
             "changed_mm": changed,
             "stale": bool(made and saved and max(saved) > min(made)),
+            "followed": self._once("followed", self._data.files.guided_chunks, self._followed),
             "bad": self._once("bad", existing(self._data.files.quality_pattern), self._bad),
         }
 
@@ -74,6 +78,27 @@ class TakeStatus:
                 if np.isfinite(value):
                     changed[int(frame)] = round(float(value), 4)
         return changed
+
+    def _followed(self) -> str:
+        """What to do where the propagated take does not follow the strokes; empty where it does."""
+        off = []
+        for frame in sorted({f for of in self._store.revisions().values() for f in of}):
+            for camera, stored in self._store.sketches_of(frame).items():
+                if stored.sketch is None:
+                    continue
+                try:
+                    mesh = self._data.propagated(frame)
+                    seen_by = self._data.cameras[camera]
+                    off.append(self._lines.off_px(stored.sketch, mesh, seen_by))
+                except (RefusedRequest, VermilionError):
+                    continue
+        if not off or np.mean(off) <= OFF_PX:
+            return ""
+        return (
+            f"The propagated contours of the drawn frames stay {np.mean(off):.1f} px off their strokes: "
+            "more of the lips is wrong than the inner lips that are predicted. Raise "
+            f"guided.regions.inner_mm (now {self._data.files.guided.regions.inner_mm:g})."
+        )
 
     def _bad(self) -> dict[int, str]:
         """Frame -> why it is doubtful: not tracked, or what the propagation said of it."""

@@ -167,6 +167,7 @@ async function fromMesh() {
 function setReview(on) {
   if (on && !status.propagated.length) { tell("The take was not propagated yet: P does it."); return; }
   set({ review: on });
+  if (on && status.followed) tell(status.followed, "error");
 }
 let player = null;
 function play() {
