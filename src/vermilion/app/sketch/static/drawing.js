@@ -39,11 +39,12 @@ export class Drawing {
     if (pan && !(event.buttons & 32)) { gesture.kind = "pan"; return; }
     if (entry.revision === null) { this.gesture = null; return; }
     if (erase) { gesture.kind = "erase"; this.view.erasing = true; this.view.stroke = [place]; this.erase(place); return; }
-    const handle = this.handleAt(place);
+    // With Shift a new stroke begins wherever it is; else a handle or the curve is taken where one is near.
+    const handle = event.shiftKey ? -1 : this.handleAt(place);
     if (handle >= 0) {
       gesture.kind = "drag"; gesture.handle = handle;
       set({ handle });
-    } else if (this.curve && nearest(this.curve.points, place).distance * this.view.scale < GRAB_PX * 0.7) {
+    } else if (!event.shiftKey && this.curve && nearest(this.curve.points, place).distance * this.view.scale < GRAB_PX * 0.7) {
       gesture.kind = "drag"; gesture.handle = this.add(place);
       set({ handle: gesture.handle });
     } else {

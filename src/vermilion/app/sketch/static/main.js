@@ -1,11 +1,11 @@
 // The page: puts its parts together.
 import { getJson, getPacket, send } from "./api.js";
+import { bindKeys, build } from "./controls.js";
 import { handlesOf, sampled } from "./curve.js";
 import { Drawing } from "./drawing.js";
 import * as frames from "./frames.js";
 import { ImageView } from "./image_view.js";
-import { Keys } from "./keys.js";
-import { MeshView, ramp } from "./mesh_view.js";
+import { MeshView } from "./mesh_view.js";
 import * as propagation from "./propagation.js";
 import * as review from "./review.js";
 import * as book from "./sketch_book.js";
@@ -196,115 +196,12 @@ async function poll() {
 }
 
 // Setting up --------------------------------------------------------------------------------------
-function button(parent, id, label, key, title, action, swatch = "") {
-  const made = document.createElement("button");
-  made.id = id; made.title = key ? `${title} (${key})` : title;
-  if (swatch) made.appendChild(document.createElement("span")).className = `swatch ${swatch}`;
-  made.append(label + " ");
-  if (key) made.appendChild(document.createElement("kbd")).textContent = key;
-  made.addEventListener("click", action);
-  byId(parent).append(made);
-}
-const flip = (name) => () => set({ [name]: !state[name] });
-const overlay = () => set({ overlay: { off: "wire", wire: "shaded", shaded: "off" }[state.overlay] });
-const before = () => set({ layer: state.layer === "after" ? "before" : "after" });
-const bright = (step) => set({ brightness: Math.round(Math.min(4, Math.max(0.2, state.brightness * step)) * 100) / 100 });
-const undo = () => { set({ handle: -1 }); book.undo(sketch()); };
-const redo = () => { set({ handle: -1 }); book.redo(sketch()); };
-const cameraStep = (step) => {
-  const names = facts.cameras.map((camera) => camera.name);
-  set({ camera: names[(names.indexOf(state.camera) + step + names.length) % names.length], handle: -1 });
+// What buttons and keys work on.
+const page = {
+  get facts() { return facts; }, get status() { return status; }, get view() { return view; },
+  get mesh3d() { return mesh3d; }, get drawing() { return drawing; },
+  sketch, goTo, jump, solve, copyNeighbour, fromMesh, setReview, play, fitMouth, fitImage,
 };
-
-function build() {
-  const labels = { upper_inner: "Upper", lower_inner: "Lower", upper_outer: "Outer up", lower_outer: "Outer low" };
-  facts.curves.forEach((name, i) => button("curves", `curve-${name}`, labels[name] || name, String(i + 1), `Draw the ${name.replace("_", " ")} contour`, () => set({ curve: name, handle: -1 }), name));
-  button("tools", "tool-draw", "Draw", "Q", "Draw freehand; drag and add handles", () => set({ tool: "draw" }));
-  button("tools", "tool-erase", "Erase", "E", "Rub out handles", () => set({ tool: "erase" }));
-  button("tools", "tool-pan", "Pan", "H", "Move the image; the right and middle buttons always do", () => set({ tool: "pan" }));
-  button("edits", "undo", "↶", "", "Undo in this frame (Ctrl+Z)", undo);
-  button("edits", "redo", "↷", "", "Redo in this frame (Ctrl+Y)", redo);
-  button("left-bar", "from-mesh", "From mesh", "K", "Start from the mesh's own contour", fromMesh);
-  button("left-bar", "copy", "Copy", "C", "Start from the nearest drawn frame", copyNeighbour);
-  button("left-bar", "onion", "Onion", "O", "Show the nearest drawn frame's curves", flip("onion"));
-  button("left-bar", "magnet", "Magnet", "G", "Pull strokes onto the detected contour", flip("magnet"));
-  button("left-bar", "near", "Near", "T", "The contour runs only about here", () => drawing.toggleKind());
-  button("left-bar", "contours", "Contours", "V", "Contours of the mesh: before red, after green", flip("contours"));
-  button("left-bar", "overlay", "Mesh", "M", "The mesh over the image", overlay);
-  const label = document.createElement("label"), range = document.createElement("input");
-  Object.assign(range, { type: "range", id: "brightness", min: 0.2, max: 4, step: 0.05, value: 1 });
-  range.addEventListener("input", () => set({ brightness: Number(range.value) }));
-  label.append("Light", range);
-  label.title = "Brightness of the image (U, I)";
-  byId("left-bar").append(label);
-  button("right-bar", "before", "Before", "B", "The mesh before the correction", before);
-  button("right-bar", "wireframe", "Wireframe", "W", "Edges of the mesh", flip("wireframe"));
-  button("right-bar", "distance", "Distance", "D", "Colour by the distance that the correction moved", flip("distance"));
-  button("right-bar", "side", "Side by side", "S", "The propagated take before and after", () => setReview(true));
-  for (const camera of facts.cameras) byId("camera").append(new Option(camera.name, camera.name));
-  byId("camera").addEventListener("change", (event) => { set({ camera: event.target.value, handle: -1 }); event.target.blur(); });
-  byId("key").replaceChildren(...["suggested", "sketched", "solved", "propagated", "bad"].map((name) => {
-    const item = document.createElement("span");
-    item.appendChild(document.createElement("span")).className = `swatch ${name}`;
-    item.append({ solved: "solved (ring)", propagated: "propagated (height: how far the lips moved)" }[name] || name);
-    return item;
-  }));
-  byId("solve").addEventListener("click", solve);
-  byId("propagate").addEventListener("click", () => propagation.open(status.run));
-  byId("review-close").addEventListener("click", () => setReview(false));
-  byId("help-button").addEventListener("click", () => byId("help").showModal());
-  byId("help-close").addEventListener("click", () => byId("help").close());
-  const c = byId("ramp").getContext("2d");
-  for (let x = 0; x < 160; x++) { c.fillStyle = `rgb(${ramp(x / 159).map((v) => v * 255)})`; c.fillRect(x, 0, 1, 8); }
-}
-
-function bindKeys() {
-  const keys = new Keys();
-  const along = ({ key }, step) => [{ ArrowLeft: -step, ArrowRight: step }[key] || 0, { ArrowUp: -step, ArrowDown: step }[key] || 0];
-  const arrow = (dx, dy, otherwise) => () => { if (!drawing.nudge(dx, dy)) otherwise(); };
-  const nothing = () => {};
-  keys.add("Frames", [
-    ["ArrowLeft", "frame before (or moves the chosen handle)", arrow(-0.5, 0, () => goTo(state.frame - 1))],
-    ["ArrowRight", "next frame (or moves the chosen handle)", arrow(0.5, 0, () => goTo(state.frame + 1))],
-    ["Shift+ArrowLeft", "10 frames back (handle: 3 px)", arrow(-3, 0, () => goTo(state.frame - 10))],
-    ["Shift+ArrowRight", "10 frames on (handle: 3 px)", arrow(3, 0, () => goTo(state.frame + 10))],
-    [[",", "."], "one frame, always", (event) => goTo(state.frame + (event.key === "," ? -1 : 1))],
-    ["Home", "first frame", () => goTo(facts.first)], ["End", "last frame", () => goTo(facts.last)],
-    ["N", "next suggested frame", () => jump(1)], ["Shift+N", "suggested frame before", () => jump(-1)],
-    ["Space", "play, stop", play],
-    [["PageUp", "PageDown"], "camera before, next camera", (event) => cameraStep(event.key === "PageUp" ? -1 : 1)],
-  ]);
-  keys.add("Curves", [
-    ...facts.curves.map((name, i) => [String(i + 1), name.replace("_", " "), () => set({ curve: name, handle: -1 })]),
-    ["Q", "draw", () => set({ tool: "draw" })], ["E", "erase", () => set({ tool: "erase" })], ["H", "pan", () => set({ tool: "pan" })],
-    ["K", "from the mesh's contour", fromMesh], ["C", "copy the nearest drawn frame", copyNeighbour],
-    ["O", "onion skin", flip("onion")], ["G", "magnet", flip("magnet")], ["T", "sure or near", () => drawing.toggleKind()],
-    [["[", "]"], "choose a handle", (event) => drawing.choose(event.key === "[" ? -1 : 1)],
-    [["ArrowUp", "ArrowDown"], "move the chosen handle", (event) => arrow(0, event.key === "ArrowUp" ? -0.5 : 0.5, nothing)()],
-    [["Shift+ArrowUp", "Shift+ArrowDown"], "by 3 px", (event) => arrow(0, event.key === "ArrowUp" ? -3 : 3, nothing)()],
-    ["A", "add a handle after the chosen one", () => drawing.addAfter()],
-    [["Delete", "Backspace"], "remove the chosen handle", () => drawing.removeHandle()], ["X", "remove the curve", () => drawing.removeCurve()],
-    ["Ctrl+Z", "undo, in this frame", undo], [["Ctrl+Y", "Ctrl+Shift+Z"], "redo, in this frame", redo],
-  ]);
-  keys.add("Correction", [
-    ["Enter", "solve the frame", solve], ["P", "propagate to the take", () => propagation.open(status.run)],
-    ["B", "before, after", before], ["S", "side by side", () => setReview(!state.review)],
-  ]);
-  keys.add("View", [
-    [["+", "="], "zoom in", () => view.zoom(1.25)], ["-", "zoom out", () => view.zoom(0.8)],
-    ["0", "the mouth", fitMouth], ["9", "the whole image", fitImage],
-    [["Ctrl+ArrowLeft", "Ctrl+ArrowRight", "Ctrl+ArrowUp", "Ctrl+ArrowDown"], "pan", (event) => view.pan(...along(event, -60))],
-    ["U", "darker", () => bright(0.87)], ["I", "lighter", () => bright(1.15)],
-    ["V", "contours of the mesh", flip("contours")], ["M", "mesh over the image: wire, shaded, off", overlay],
-    ["W", "wireframe in 3D", flip("wireframe")], ["D", "distance colours in 3D", flip("distance")],
-    [["Alt+ArrowLeft", "Alt+ArrowRight", "Alt+ArrowUp", "Alt+ArrowDown"], "turn the mesh", (event) => mesh3d && mesh3d.turn(...along(event, -0.15))],
-    ["Alt+0", "the mesh from the front", () => mesh3d && mesh3d.reset()],
-    ["?", "this sheet", () => byId("help").showModal()],
-    ["Escape", "let go of the handle; close", () => (state.review ? setReview(false) : set({ handle: -1, playing: false }))],
-  ]);
-  byId("keys").replaceChildren(...keys.sheet());
-  window.addEventListener("keydown", (event) => keys.handle(event));
-}
 
 async function start() {
   [facts, topology] = await Promise.all([getJson("api/take"), getPacket("api/topology")]);
@@ -336,8 +233,8 @@ async function start() {
     box.textContent = `This browser shows no 3D (${error.message}). Drawing, solving and propagating work without it.`;
     byId("right").append(box);
   }
-  build();
-  bindKeys();
+  build(page);
+  bindKeys(page);
   propagation.wire(() => Promise.all(book.unsaved().map(book.settled)), () => setReview(true));
   book.onSketch((entry) => {
     if (entry.camera === state.camera && entry.frame === state.frame) view.sketch = entry;
