@@ -22,7 +22,7 @@ from tests.sketch_take import CAMERA, TAKE, make_take
 from tests.unit import guided_mouths as mouths
 
 ROOT = Path(__file__).resolve().parents[2]
-PICTURES = ROOT / "results" / "browser"
+SCREENSHOTS = ROOT / "results" / "browser"
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 1366, "height": 768}
@@ -129,10 +129,10 @@ class Page:
         self.says("frame-text", f"^Frame {frame} ")
         self.still()
 
-    def picture(self, name: str) -> None:
-        PICTURES.mkdir(parents=True, exist_ok=True)
+    def screenshot(self, name: str) -> None:
+        SCREENSHOTS.mkdir(parents=True, exist_ok=True)
         self.tab.wait_for_timeout(600)
-        self.tab.screenshot(path=PICTURES / f"{name}.png")
+        self.tab.screenshot(path=SCREENSHOTS / f"{name}.png")
 
 
 @pytest.fixture

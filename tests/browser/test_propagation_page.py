@@ -30,7 +30,7 @@ def test_the_take_follows_two_drawn_frames(page, take):
     assert counts == {
         "guided_refine": 2, "guided_train": 1, "guided_correct": 1, "guided_export": 1,
     }  # fmt: skip
-    page.picture("jobs")
+    page.screenshot("jobs")
     # Started and cancelled: nothing half made stays, and the page says so.
     page.press("Enter")
     page.says("propagation-text", "so far")
@@ -41,7 +41,7 @@ def test_the_take_follows_two_drawn_frames(page, take):
     page.says("propagation-text", "jobs? will run")
     page.press("Enter")
     page.says("propagation-text", r"\d of \d jobs done")
-    page.picture("progress")
+    page.screenshot("progress")
     page.says("propagation-text", "Done in")
     assert guided(take, "overlay.mp4").is_file()
     refined = RefinedFrame.load(guided(take, f"refined/{SUGGESTED[0]:06d}.npz"))
@@ -51,7 +51,7 @@ def test_the_take_follows_two_drawn_frames(page, take):
     assert page.tab.locator("#thumbs button").count() == N_FRAMES
     page.tab.locator("#thumbs button").first.click()
     page.press("m", "m")
-    page.picture("before_and_after")
+    page.screenshot("before_and_after")
     assert page.text("right-tag") == "After"
     # Unchanged: nothing would run.
     page.press("Escape", "p")
@@ -71,4 +71,4 @@ def test_a_job_that_fails_is_named_with_its_log(page, take):
     page.press("Enter")
     page.says("propagation-text", "guided_refine failed")
     page.says("log", "camera other")
-    page.picture("failed")
+    page.screenshot("failed")

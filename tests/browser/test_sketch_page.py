@@ -43,14 +43,14 @@ def test_lips_are_drawn_with_the_mouse_and_solved_in_a_second(page, take):
     for name, line in lips(take, FIRST).items():
         assert off(found[name][0], line) < 0.4
         assert 3 <= len(found[name][1]) <= 14
-    page.picture("drawn")
+    page.screenshot("drawn")
     page.press("Enter")
     page.says("solve-text", r"solved in \d")
     figures = re.findall(r"\d+\.\d+", page.text("solve-text"))
     assert float(figures[1]) < 0.5  # px off the strokes, mean
     page.says("message", "is solved")
     page.press("d")
-    page.picture("solved")
+    page.screenshot("solved")
     assert page.complaints == []
     assert page.hosts == {page.tab.url.split("/")[2]}
 
@@ -115,7 +115,7 @@ def test_everything_works_with_keys_alone(page, take):
     page.still()
     assert set(saved(take, SUGGESTED[1])) == {"upper_inner"}
     page.press("?")
-    page.picture("keys")
+    page.screenshot("keys")
     sheet = page.text("keys")
     for words in ("solve the frame", "next suggested frame", "undo, in this frame", "magnet"):
         assert words in sheet
@@ -217,7 +217,7 @@ def test_a_curve_that_crosses_itself_is_not_saved_and_says_so(page, take):
     page.says("saved", "not saved")
     page.press("Enter")
     page.says("message", "cannot be solved")
-    page.picture("refused")
+    page.screenshot("refused")
     np.testing.assert_array_equal(saved(take)["upper_inner"][0], before)
     page.press("Control+z")
     page.still()
