@@ -10,7 +10,9 @@ export function wire(settleSketches, openReview) {
   byId("propagation-cancel").addEventListener("click", () => act("api/cancel"));
   byId("propagation-close").addEventListener("click", () => dialog.close());
   byId("propagation-review").addEventListener("click", () => { dialog.close(); openReview(); });
-  dialog.addEventListener("keydown", (event) => {
+  // Of the whole window: a button that is hidden takes the focus out of the dialog.
+  window.addEventListener("keydown", (event) => {
+    if (!dialog.open) return;
     if (event.key === "Enter" && !byId("propagation-start").hidden && event.target.tagName !== "BUTTON") start();
     else if (event.key.toLowerCase() === "s" && !byId("propagation-review").hidden) { dialog.close(); openReview(); }
     else return;
