@@ -61,5 +61,5 @@ class MouthChange:
         """The change of what `arrays` gave, (k, D) and (k, 3U); None where there is none."""
         if "change_scale" not in arrays:
             return None
-        names = "change_deformations", "change_weights_mm"
-        return cls(*(arrays[name] for name in names), float(arrays["change_scale"]))
+        deformations, weights_mm = arrays["change_deformations"], arrays["change_weights_mm"]
+        return cls(deformations, weights_mm, float(arrays["change_scale"]))
