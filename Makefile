@@ -19,6 +19,7 @@ help:
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
+	@echo "make test-slurm  the tiny capture on a real Slurm of two nodes (as root)"
 	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
 	@echo "make docs        build the documentation site (results/site); also regenerates the"
@@ -74,6 +75,10 @@ test-interchange: $(READY) $(VENV)-interchange.ready
 $(VENV)-interchange.ready: requirements.interchange.lock tools/setup_interchange.sh | $(READY)
 	tools/setup_interchange.sh $(VENV)-interchange $(PYTHON)
 	@touch $@
+
+# A real Slurm of two nodes on this machine; needs root. VERMILION_TEST_SLURM=all compares a whole run.
+test-slurm: setup
+	VERMILION_TEST_SLURM=$${VERMILION_TEST_SLURM:-1} $(BIN)/python -m pytest tests/slurm
 
 lint: $(READY)
 	$(BIN)/ruff check .
