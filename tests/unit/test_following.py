@@ -113,9 +113,9 @@ def test_pans_flashes_and_brightening_are_no_cuts():
 
 def test_a_jump_of_the_face_before_the_same_background_is_a_cut(tmp_path):
     def image(x):
-        picture = scene(5).copy()
-        picture[30:60, x : x + 24] = [0.9, 0.5, 0.3]
-        return picture + RNG.normal(0, 0.002, picture.shape).astype(np.float32)
+        pixels = scene(5).copy()
+        pixels[30:60, x : x + 24] = [0.9, 0.5, 0.3]
+        return pixels + RNG.normal(0, 0.002, pixels.shape).astype(np.float32)
 
     x = np.where(np.arange(40) < 20, 30, 44) + np.round(np.sin(np.arange(40) / 3)).astype(int)
     faces = [[face((8 * k, 200), 160)] for k in x]

@@ -121,8 +121,8 @@ def follow(seen: SeenFaces, choice: FaceChoice, one_shot: bool = False) -> Follo
         piece = pieces_of(n, find_cuts(seen.looks))
         piece = pieces_of(n, find_cuts(seen.looks, _jumps(seen, _followed(seen, piece, choice))))
     row = _followed(seen, piece, choice)
-    strangers = other_persons(seen, row, piece, choice.person_difference)
-    return _told(seen, piece, row, strangers, choice)
+    differences = other_persons(seen, row, piece, choice.person_difference)
+    return _told(seen, piece, row, differences, choice)
 
 
 def _followed(seen: SeenFaces, piece: np.ndarray, choice: FaceChoice) -> np.ndarray:
@@ -210,7 +210,7 @@ def _told(
     seen: SeenFaces,
     piece: np.ndarray,
     row: np.ndarray,
-    strangers: dict[int, float],
+    differences: dict[int, float],
     choice: FaceChoice,
 ) -> FollowedFace:
     """The result, with a reason for each frame that needs one."""
@@ -230,10 +230,10 @@ def _told(
         if not there[at]:
             others = f"; {count[at]} other face(s) are not taken for it" if count[at] else ""
             told.append((str(seen.reasons[at]) or NOT_FOUND) + others)
-        elif piece[at] in strangers:
+        elif piece[at] in differences:
             valid[at] = False
             told.append(
-                f"another person than in the first piece (shapes differ by {strangers[piece[at]]:.3f} eye "
+                f"another person than in the first piece (shapes differ by {differences[piece[at]]:.3f} eye "
                 f"distances, more than {choice.person_difference:g}): give these frames a take of another "
                 "subject, or raise landmarks.following.person_difference"
             )
