@@ -1,4 +1,4 @@
-"""Guided correction as users do it: C of a finished run, sketches of a few frames, the others measured.
+"""Guided correction as users do it: C of a finished run, a few frames sketched, the rest measured.
 
 Sketches are drawn from the true contours with a hand's error (1 px at a mouth of 120 px, smooth along the stroke;
 inner and outer contours). Chosen frames are refined, train, and correct the take. Figure: motion error of the inner

@@ -12,7 +12,7 @@ from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import ImageReading, linear_to_srgb, read_image
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external import read_tracked
+from vermilion.tracking.external.read import read_tracked
 
 pytestmark = pytest.mark.data
 

@@ -9,7 +9,7 @@ from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.imaging.frames import list_frames
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external import read_tracked
+from vermilion.tracking.external.read import read_tracked
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_two_sequences_in_a_folder_are_both_named(tmp_path, names, said):
 def test_meshes_are_numbered_the_same_way(tmp_path):
     triangles = np.array([[0, 1, 2]], dtype=np.int32)
     for frame in range(4):
-        corners = np.array([[frame, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=float)
+        corners = np.array([[frame, 0, 0], [200, 0, 0], [0, 200, 0]], dtype=float)
         write_ply(tmp_path / f"tst{frame:03d}.ply", Mesh(corners, triangles))
     sequence = read_tracked(tmp_path, [0, 3])
     assert np.array_equal(sequence.vertices_mm[:, 0, 0], [0, 3])
