@@ -62,14 +62,14 @@ export class ImageView {
     this.zoom(Math.exp(-event.deltaY * (event.ctrlKey ? 0.01 : 0.0015)), [event.clientX - box.left, event.clientY - box.top]);
   }
   draw() {
+    // Where image pixels are on the canvas, for tests.
+    this.canvas.dataset.place = [this.scale, this.x, this.y].join(" ");
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => { this.waiting = false; this.paint(); });
   }
   paint() {
     const c = this.context;
-    // Where image pixels are on the canvas, for tests.
-    this.canvas.dataset.place = [this.scale, this.x, this.y].join(" ");
     c.setTransform(1, 0, 0, 1, 0, 0);
     c.clearRect(0, 0, this.canvas.width, this.canvas.height);
     c.setTransform(this.ratio * this.scale, 0, 0, this.ratio * this.scale, this.ratio * this.x, this.ratio * this.y);
