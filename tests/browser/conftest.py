@@ -76,19 +76,23 @@ class Page:
 
     Attributes:
         tab: the browser's page.
-        complaints: what the browser's console said.
+        complaints: what the browser's console said; what the server refused is a sentence of the page, not one of these.
         hosts: who was asked for anything.
     """
 
     def __init__(self, tab, address: str):
         self.tab, self.complaints, self.hosts = tab, [], set()
         tab.set_default_timeout(PATIENCE_MS)
-        tab.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
+        tab.on("console", self._hear)
         tab.on("pageerror", lambda error: self.complaints.append(str(error)))
         tab.on("request", lambda request: self.hosts.add(request.url.split("/")[2]))
         tab.goto(address)
         tab.locator("body[data-ready]").wait_for()
         self.still()
+
+    def _hear(self, message) -> None:
+        if message.type == "error" and "server responded with a status of 4" not in message.text:
+            self.complaints.append(message.text)
 
     def press(self, *keys: str) -> None:
         for key in keys:

@@ -161,6 +161,7 @@ def run_stages(root, params, chunk, frames) -> None:
             "fit": root / "fit.npz",
             "coarse": root / chunk / "C.npy",
             "maps": root / chunk / "maps",
+            "landmarks": root / "landmarks.npz",
         },
         output={
             "features": root / chunk / "features.npz",
