@@ -13,9 +13,9 @@ from vermilion.imaging.video import write_video
 from .conftest import Project
 
 TRACK = {
-    "face_model", "video_facts", "capture", "cameras", "landmarks", "image_identity", "tracking",
-    "tracking_topology", "appearance", "image_fit", "image_fit_join", "tracking_meshes",
-    "contour_detector", "contours", "features", "apply", "apply_export", "quality", "lips_page",
+    "face_model", "video_facts", "capture", "cameras", "landmarks_faces",
+    "landmarks_followed", "landmarks", "image_identity", "tracking", "tracking_topology",
+    "appearance", "image_fit", "image_fit_join", "tracking_meshes", "contour_detector", "contours", "features", "apply", "apply_export", "quality", "lips_page",
 }  # fmt: skip
 
 
