@@ -198,7 +198,8 @@ rule lips_page:
         fps=take_fps,
         how=how_applied,
         only=len(TAKES) == 1,
-        configuration=ORIGIN,
+        # Relative: a project that is moved reruns nothing.
+        configuration=", ".join(os.path.relpath(path) for path in workflow.configfiles),
     script:
         "../scripts/apply/lips_page.py"
 
