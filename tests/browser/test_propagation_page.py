@@ -2,11 +2,9 @@
 
 import pytest
 
-from tests.browser.conftest import clear
 from tests.browser.test_sketch_page import draw_lips
-from tests.sketch_take import CAMERA, N_FRAMES, SUGGESTED
+from tests.sketch_take import N_FRAMES, SUGGESTED
 from vermilion.guided.refined_frame import RefinedFrame
-from vermilion.guided.sketch import sketch_path
 
 pytestmark = pytest.mark.slow
 
@@ -58,17 +56,3 @@ def test_the_take_follows_two_drawn_frames(page, take):
     page.says("propagation-text", "Nothing has changed")
     page.press("Escape")
     assert page.complaints == []
-
-
-def test_a_job_that_fails_is_named_with_its_log(page, take):
-    clear(take)
-    page.press("g")
-    draw_lips(page, take)
-    path = sketch_path(take.labels, CAMERA, SUGGESTED[0])
-    path.write_text(path.read_text().replace('"camera": "cam"', '"camera": "other"'))
-    page.press("p")
-    page.says("propagation-text", "jobs? will run")
-    page.press("Enter")
-    page.says("propagation-text", "guided_refine failed")
-    page.says("log", "camera other")
-    page.screenshot("failed")

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 TAKE, FRAMES = "s1/phone", (2, 5)
 REFINE, AFTER = "guided_refine", {"guided_train": 1, "guided_correct": 1, "guided_export": 1}
-REPORT = {"quality": 1, "summary": 1}
+REPORT = {"quality": 1, "lips_page": 1, "summary": 1}
 
 
 def correct_the_video(content):

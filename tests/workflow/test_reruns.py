@@ -13,7 +13,8 @@ pytestmark = pytest.mark.slow
 TAKE = "s1/rom"
 #: What follows from new regressors.
 AFTER_TRAINING = {
-    "evaluate", "evaluation_figures", "measures", "apply", "apply_export", "quality", "summary",
+    "evaluate", "evaluation_figures", "measures", "apply", "apply_export", "lips_page", "quality",
+    "summary",
 }  # fmt: skip
 AFTER_FEATURES = AFTER_TRAINING | {"database", "train"}
 AFTER_CONTOURS = AFTER_FEATURES | {"features", "neutral_pair"}
@@ -178,7 +179,7 @@ def test_relief_of_a_take(finished):
 
     added = {"relief_light", "relief", "relief_meshes"}
     with configured(finished, change):
-        assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
+        assert set(finished.would_run()) == added | {"ablations", "lips_page", "quality", "summary"}
 
 
 def test_relief_after_the_corrective_flow(finished):
@@ -187,7 +188,7 @@ def test_relief_after_the_corrective_flow(finished):
 
     added = {"detail_flow", "relief_light", "relief", "relief_meshes"}
     with configured(finished, change):
-        assert set(finished.would_run()) == added | {"ablations", "quality", "summary"}
+        assert set(finished.would_run()) == added | {"ablations", "lips_page", "quality", "summary"}
 
 
 def test_line_of_code_in_the_tracking_module(finished):
