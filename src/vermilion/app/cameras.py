@@ -7,10 +7,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import yaml
 
 from vermilion.capture.camera_files.read import GivenCameras, convergence, read_given_cameras
-from vermilion.config.load import load_configuration
+from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.takes import Take
 from vermilion.geometry.camera import Camera
 from vermilion.imaging.draw import draw_points, label, resized_to_height, tile, to_display
@@ -99,8 +98,8 @@ def _drawn(
 
 def report(configuration: str | Path, wanted: str | None = None) -> int:
     """Print and draw the cameras of a configuration's takes, or of one; returns the exit status."""
-    raw = yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {}
-    loaded, takes = load_configuration(raw, str(configuration), check_disk=False)
+    keys = read_keys(configuration)
+    loaded, takes = load_configuration(keys, str(configuration), check_disk=False)
     status = 0
     for take in takes:
         if wanted not in (None, take.name):

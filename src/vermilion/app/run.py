@@ -15,15 +15,12 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from vermilion.app.results import summary
 from vermilion.app.workflow import run_workflow
+from vermilion.config.load import read_keys
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take, read_takes
-from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import FAILED_SUFFIX
 
 
@@ -105,7 +102,7 @@ def write_report(configuration: str, results: Path, skipped: dict[str, str]) -> 
 
 def main(configuration: str, options: list[str]) -> int:
     """Run, write the report, say where to look; 0 where every take was made."""
-    raw, results = _read(configuration), results_folder(configuration)
+    raw, results = read_keys(configuration), results_folder(configuration)
     takes, _ = read_takes(str(raw.get("takes", Configuration.model_fields["takes"].default)))
     code, skipped = 0, dict(raw.get("skip_takes", {}))
     if options != ["--only-report"]:
@@ -119,27 +116,8 @@ def main(configuration: str, options: list[str]) -> int:
 
 def results_folder(configuration: str | Path) -> Path:
     """The folder of a configuration's results."""
-    named = _read(configuration).get("results", Configuration.model_fields["results"].default)
+    named = read_keys(configuration).get("results", Configuration.model_fields["results"].default)
     return Path(str(named))
-
-
-def _read(configuration: str | Path) -> dict[str, Any]:
-    """A configuration file as it is, unchecked. Raises InputError where it cannot be read."""
-    try:
-        content = yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {}
-    except (OSError, yaml.YAMLError) as error:
-        raise InputError(
-            f"no readable configuration ({error})", "a YAML file", "Correct the path or the file.",
-            path=configuration,
-        ) from error  # fmt: skip
-    if not isinstance(content, dict):
-        raise InputError(
-            f"a {type(content).__name__}",
-            "keys and values",
-            "See config/README.md.",
-            path=configuration,
-        )
-    return content
 
 
 def _sentence(head: str, takes: dict[str, str]) -> str:

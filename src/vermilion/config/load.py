@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
@@ -56,6 +57,28 @@ def load_configuration(
         raise ConfigurationError(problems)
     assert configuration is not None
     return configuration, takes
+
+
+def read_keys(path: str | Path) -> dict[str, Any]:
+    """The keys of a configuration file as they stand there, unchecked.
+
+    Raises:
+        InputError: the file cannot be read, is no YAML, or holds no keys.
+    """
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding="utf-8")) or {}
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(
+            f"no readable configuration ({error})",
+            "a YAML file",
+            "Correct the path (CONFIG=config/yours.yaml) or the file.",
+            path=path,
+        ) from error
+    if not isinstance(content, dict):
+        raise InputError(
+            f"a {type(content).__name__}", "keys and values", "See config/README.md.", path=path
+        )
+    return content
 
 
 def check_source(take: Take, reading: ImageReading = AS_TAGGED) -> list[str]:

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from vermilion.config.guided import GuidedConfig
-from vermilion.config.load import load_configuration
+from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.root import Configuration
 from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
 from vermilion.imaging.source import Source, folder_of
-from vermilion.storage.errors import ConfigurationError, InputError
+from vermilion.storage.errors import InputError
 
 #: The workflow's own list of paths, which is plain Python.
 PATHS = Path("workflow/rules/paths.smk")
@@ -128,16 +126,7 @@ def existing(pattern: Path) -> list[Path]:
 
 def read_configuration(path: str) -> tuple[Configuration, list[Take]]:
     """The checked configuration and take sheet of a file, without the takes that it leaves out."""
-    try:
-        raw = yaml.safe_load(Path(path).read_text(encoding="utf-8")) or {}
-    except (OSError, yaml.YAMLError) as error:
-        raise InputError(
-            f"no readable configuration ({error})", "a YAML file", "Say CONFIG=config/yours.yaml.",
-            path=path,
-        ) from error  # fmt: skip
-    if not isinstance(raw, dict):
-        raise ConfigurationError([f"{path}: found no keys; expected a configuration."])
-    return without_skipped(*load_configuration(raw, path))
+    return without_skipped(*load_configuration(read_keys(path), path))
 
 
 def _results_paths(paths: Path, config: Configuration) -> Any:
