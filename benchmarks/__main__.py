@@ -2,62 +2,38 @@
 
 from __future__ import annotations
 
-import argparse
-import ast
-import importlib
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from vermilion.app.subcommands import listing, parser_of, subcommands
+
 
 def benchmarks() -> dict[str, str]:
-    """Name of each benchmark -> the first line of its docstring.
-
-    A module with a function `run` is a benchmark; the others hold what benchmarks share. Modules are
-    parsed, not imported, so that the list is quick.
-    """
-    found = {}
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        tree = ast.parse(path.read_text())
-        if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
-            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
-    return found
+    """Name of each benchmark -> the first line of its docstring."""
+    return subcommands(Path(__file__).parent)
 
 
-def parser_of(name: str) -> argparse.ArgumentParser:
-    """The command line of a benchmark; its help is the module's docstring."""
-    module = importlib.import_module(f"benchmarks.{name}")
-    parser = argparse.ArgumentParser(
-        prog=f"python -m benchmarks {name}",
-        description=module.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    module.add_arguments(parser)
-    parser.set_defaults(run=module.run)
-    return parser
-
-
-def listing() -> str:
-    """One line a benchmark."""
-    lines = [f"  {name:14} {line}" for name, line in benchmarks().items()]
-    usage = "usage: python -m benchmarks NAME [--help] [options], from the repository's root"
-    return "\n".join([usage, "", *lines])
+def usage() -> str:
+    """How to call it, and one line a benchmark."""
+    line = "usage: python -m benchmarks NAME [--help] [options], from the repository's root"
+    return listing(line, benchmarks())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """List the benchmarks, or run one; returns the exit status."""
     name, *options = [*(sys.argv[1:] if arguments is None else arguments)] or ["--help"]
     if name in ("-h", "--help"):
-        print(listing())
+        print(usage())
         return 0
     if name not in benchmarks():
-        print(f"no benchmark is called {name!r}\n\n{listing()}", file=sys.stderr)
+        print(f"no benchmark is called {name!r}\n\n{usage()}", file=sys.stderr)
         return 2
     # Figures are of one core. This takes effect only before numpy loads.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    parsed = parser_of(name).parse_args(options)
+    parsed = parser_of(f"benchmarks.{name}", f"python -m benchmarks {name}").parse_args(options)
 
     import cv2
 

@@ -9,15 +9,16 @@ import pytest
 from vermilion.app import doctor, main
 from vermilion.app.commands import lips
 from vermilion.app.place import from_here
+from vermilion.app.subcommands import parser_of
 
 
 def test_every_subcommand_has_a_line_and_a_help(capsys):
-    found = main.subcommands()
+    found = main.commands()
     assert {"lips", "demo", "run", "report", "verify", "doctor", "docs"} <= set(found)
     for name, line in found.items():
         assert line.endswith("."), name
         with pytest.raises(SystemExit) as ended:
-            main.parser_of(name).parse_args(["--help"])
+            parser_of(f"vermilion.app.commands.{name}", f"vermilion {name}").parse_args(["--help"])
         assert ended.value.code == 0 and f"vermilion {name}" in capsys.readouterr().out
 
 

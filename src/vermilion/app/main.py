@@ -2,63 +2,42 @@
 
 from __future__ import annotations
 
-import argparse
-import ast
-import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+
+from vermilion.app.subcommands import listing, parser_of, subcommands
 
 #: Order of the list; further subcommands follow by name.
 _FIRST = ("lips", "demo", "run", "sketch", "report", "verify", "doctor", "docs")
 
 
-def subcommands() -> dict[str, str]:
-    """Name of each subcommand -> the first line of its docstring. Modules are parsed, not imported."""
-    found = {}
-    for path in sorted((Path(__file__).parent / "commands").glob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        if any(isinstance(node, ast.FunctionDef) and node.name == "run" for node in tree.body):
-            found[path.stem] = (ast.get_docstring(tree) or "").partition("\n")[0]
-    order = [name for name in _FIRST if name in found]
-    return {name: found[name] for name in [*order, *sorted(set(found) - set(order))]}
+def commands() -> dict[str, str]:
+    """Name of each subcommand -> the first line of its docstring."""
+    return subcommands(Path(__file__).parent / "commands", _FIRST)
 
 
-def parser_of(name: str) -> argparse.ArgumentParser:
-    """The command line of a subcommand; its help is the module's docstring."""
-    module = importlib.import_module(f"vermilion.app.commands.{name}")
-    parser = argparse.ArgumentParser(
-        prog=f"vermilion {name}",
-        description=module.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    module.add_arguments(parser)
-    parser.set_defaults(run=module.run, passes_on=getattr(module, "PASSES_ON", False))
-    return parser
-
-
-def listing() -> str:
-    """One line a subcommand."""
-    lines = [f"  {name:10} {line}" for name, line in subcommands().items()]
-    usage = "usage: vermilion COMMAND [--help] [options], from the project's folder"
-    return "\n".join([usage, "", *lines])
+def usage() -> str:
+    """How to call it, and one line a subcommand."""
+    line = "usage: vermilion COMMAND [--help] [options], from the project's folder"
+    return listing(line, commands())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """List the subcommands, or run one; returns the exit status."""
     name, *options = [*(sys.argv[1:] if arguments is None else arguments)] or ["--help"]
     if name in ("-h", "--help"):
-        print(listing())
+        print(usage())
         return 0
     if name == "--version":
         import vermilion
 
         print(f"vermilion {vermilion.__version__}")
         return 0
-    if name not in subcommands():
-        print(f"no subcommand is called {name!r}\n\n{listing()}", file=sys.stderr)
+    if name not in commands():
+        print(f"no subcommand is called {name!r}\n\n{usage()}", file=sys.stderr)
         return 2
-    parser = parser_of(name)
+    parser = parser_of(f"vermilion.app.commands.{name}", f"vermilion {name}")
     parsed, unknown = parser.parse_known_args(options)
     parsed.options = unknown
     if parsed.options and not parsed.passes_on:
