@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from vermilion.baselines.null import NAME as NULL
 from vermilion.config.regressors import split_name
 from vermilion.evaluation.comparisons import KINDS
 
@@ -17,18 +18,23 @@ FEATURES = {
     "": "combined",
 }
 ESTIMATORS = ("rbf", "affine", "kernel")
+#: What the tables call the features and the estimator of `null`.
+NOTHING = "none"
 
 
-def table2(curves: Sequence[pd.DataFrame]) -> pd.DataFrame:
+def table2(curves: Sequence[pd.DataFrame], measures: pd.DataFrame) -> pd.DataFrame:
     """Influence of the features on the cross-validation error, PS and GR over all people.
 
     Args:
         curves: the cross-validation curve of each regressor, a row a grid point.
+        measures: every measure; the row of `null` is its error on held-out frames, as nothing is
+            cross-validated that learns nothing.
 
     Returns:
         columns features, regressor, feature_error, deviation (over folds), frames.
     """
-    return _cross_validated(curves, FEATURES, "features")
+    table = _cross_validated(curves, FEATURES, "features")
+    return _with_null(table, "features", measures).drop(columns=["alpha", "beta"])
 
 
 def table3(table1: pd.DataFrame) -> pd.DataFrame:
@@ -44,11 +50,13 @@ def table3(table1: pd.DataFrame) -> pd.DataFrame:
 
 
 def estimators(
-    curves: Sequence[pd.DataFrame], table1: pd.DataFrame, configured: str
+    curves: Sequence[pd.DataFrame], measures: pd.DataFrame, table1: pd.DataFrame, configured: str
 ) -> pd.DataFrame:
     """Every estimator with its best parameters: cross-validation and tracking error.
 
     Args:
+        curves, measures: as `table2` takes them.
+        table1: with the variants.
         configured: the estimator of the configuration, which has no variant of its name.
 
     Returns:
@@ -56,7 +64,8 @@ def estimators(
         std_mm. Of PS and GR, alpha and beta are the medians over the people.
     """
     names = {"" if name == configured else name: name for name in ESTIMATORS}
-    validated = _cross_validated(curves, names, "estimator").drop(columns="frames")
+    validated = _cross_validated(curves, names, "estimator")
+    validated = _with_null(validated, "estimator", measures).drop(columns="frames")
     tracked = _tracked(table1, names, "estimator").drop(columns=["ratio_to_base", "frames"])
     return validated.merge(tracked, on=["estimator", "regressor"], how="left")
 
@@ -89,8 +98,21 @@ def _cross_validated(
                 }
             )
     columns = [heading, "regressor", "alpha", "beta", "feature_error", "deviation", "frames"]
-    table = pd.DataFrame(rows, columns=columns)
-    return table if heading == "estimator" else table.drop(columns=["alpha", "beta"])
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _with_null(table: pd.DataFrame, heading: str, measures: pd.DataFrame) -> pd.DataFrame:
+    """The table with a row for `null`, where its error on true layers was measured."""
+    of_null = (measures["regressor"] == NULL) & (measures["measure"] == "feature_error")
+    found = measures[of_null & (measures["subject"] == "all") & (measures["take"] == "all")]
+    if table.empty or found.empty:
+        return table
+    row = found.iloc[0]
+    table.loc[len(table)] = {
+        heading: NOTHING, "regressor": NULL, "alpha": np.nan, "beta": np.nan,
+        "feature_error": float(row["value"]), "deviation": np.nan, "frames": int(row["frames"]),
+    }  # fmt: skip
+    return table
 
 
 def _tracked(table1: pd.DataFrame, names: dict[str, str], heading: str) -> pd.DataFrame:
@@ -106,4 +128,8 @@ def _tracked(table1: pd.DataFrame, names: dict[str, str], heading: str) -> pd.Da
     table = pd.DataFrame(found, columns=[heading, "regressor", *columns])
     # A regressor without variants shows no influence of features.
     several = table.groupby("regressor")[heading].transform("nunique") > 1
-    return table[several].reset_index(drop=True)
+    table = table[several].reset_index(drop=True)
+    if len(table) and NULL in rows.index:
+        nothing = {heading: NOTHING, "regressor": NULL}
+        table.loc[len(table)] = nothing | rows.loc[NULL, columns].to_dict()
+    return table

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from vermilion.baselines.null import NAME as NULL
 from vermilion.config.regressors import is_variant
 from vermilion.evaluation.mouth_kinds import KINDS
 from vermilion.report import page
@@ -50,10 +51,12 @@ def feature_section(table2: pd.DataFrame, table3: pd.DataFrame) -> str:
         "high_mm": "high", "std_mm": "deviation, mm", "ratio_to_base": "of base", "frames": "frames",
     }  # fmt: skip
     several = table2.groupby("regressor")["features"].transform("nunique") > 1
+    several |= table2["regressor"] == NULL
     return (
         "<h3>Table 2: cross-validation error</h3>"
         + page.table(_digits(table2[several], ["feature_error", "deviation"]), errors, "regressor")
-        + "<p>Lips16, on its data: 0.14, 0.17 and 0.13 for shape coefficients, distances, both.</p>"
+        + "<p>Lips16, on its data: 0.14, 0.17 and 0.13 for shape coefficients, distances, both. "
+        "<code>null</code> has learnt nothing; its error is that of the held-out frames.</p>"
         "<h3>Table 3: tracking error</h3>"
         + page.table(table3, tracking, "regressor")
         + "<p>Lips16, on its data: 3.2, 3.3 and 3.0 mm.</p>"
@@ -75,6 +78,7 @@ def estimator_section(estimators: pd.DataFrame) -> str:
         "least three train (of PS and GR: the median over "
         "the people). Lips16, on its data: 0.13 for the RBF network, 0.14 for the affine map.</p>"
     )
+    several |= estimators["regressor"] == NULL
     shown = _digits(estimators[several], ["alpha", "beta", "feature_error", "deviation"])
     return note + page.table(shown, headings, "regressor")
 

@@ -40,9 +40,9 @@ def main(snakemake):
     compared = comparisons(takes, questions_of(configured), *pooled)
     write_table(snakemake.output.comparisons, compared)
     write_table(snakemake.output.headline, headline(measures, compared))
-    write_table(snakemake.output.table2, table2(curves))
+    write_table(snakemake.output.table2, table2(curves, measures))
     write_table(snakemake.output.table3, table3(summary))
-    write_table(snakemake.output.estimators, estimators(curves, summary, configured))
+    write_table(snakemake.output.estimators, estimators(curves, measures, summary, configured))
     tables = [read_table(path) for path in snakemake.input.frames]
     over_time = dict(zip(names, tables, strict=True))
     plot_figure16(over_time, rbf_and_affine(configured), snakemake.output.figure16)
