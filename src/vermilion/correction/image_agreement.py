@@ -174,9 +174,8 @@ class ImageAgreement:
             )
 
         constraints = on_contours(seen, vertices)
-        if (
-            weight > 0
-        ):  # which points form the inner contour, and which are far off, at about the result
+        # Which points form the inner contour, and which are far off: found again at about the result.
+        if weight > 0:
             now = np.array(vertices)
             forces = self._solver.forces(constraints)
             now[self._lips] += self._solver.displacements_at(self._lips, constraints, forces)

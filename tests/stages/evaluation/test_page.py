@@ -94,7 +94,11 @@ def test_every_comparison_of_section_6_is_there(tables):
     tracking = read_table(tables / "table3.tsv").set_index("features")["mean_mm"]
     table = read_table(tables / "table1.tsv").set_index(["subject", "regressor"])["mean_mm"]
     assert tracking["combined"] == table["all", "MS"]
-    assert set(read_table(tables / "estimators.tsv")["estimator"]) == {"rbf", "affine", "kernel"}
+    estimators = read_table(tables / "estimators.tsv")
+    assert set(estimators["estimator"]) == {"rbf", "affine", "kernel", "none"}
+    nothing = [rows.loc[rows["regressor"] == "null"] for rows in (features, estimators)]
+    assert all(len(rows) == 1 and rows["feature_error"].item() > 0 for rows in nothing)
+    assert tracking["none"] == table["all", "null"]
 
 
 def test_headline_holds_every_regressor_against_one_that_learnt_nothing(tables):
