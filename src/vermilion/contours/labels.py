@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.paths import cheapest_path
+from vermilion.geometry.polylines import evenly_along, lengths_along
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
@@ -30,10 +31,7 @@ class Polyline:
         points = self.points_px
         if self.closed:
             points = np.concatenate([points, points[:1]])
-        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
-        places = np.linspace(0.0, along[-1], max(int(along[-1] / step_px), 1) + 1)
-        return np.stack([np.interp(places, along, points[:, k]) for k in range(2)], axis=1)
+        return evenly_along(points, max(int(lengths_along(points)[-1] / step_px), 1) + 1)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.polylines import evenly_along
 from vermilion.guided.curves import first_self_crossing
 from vermilion.guided.sketch import Sketch, SketchCurve
 from vermilion.studio.labels import lip_contours
@@ -55,7 +56,7 @@ def drawn_sketch(
     curves = {}
     for part in ("inner", "outer") if hand.outer else ("inner",):
         for side, points in zip(("upper", "lower"), halves(loops[part]), strict=True):
-            stroke = resample(points, N_POINTS)
+            stroke = evenly_along(points, N_POINTS)
             for _ in range(10):
                 drawn = stroke + hand.error_px * smooth_error(len(stroke), rng)
                 if first_self_crossing(drawn) is None:
@@ -76,14 +77,6 @@ def halves(loop_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if first[:, 1].mean() <= second[:, 1].mean():
         return first, second
     return second, first
-
-
-def resample(points_px: np.ndarray, count: int) -> np.ndarray:
-    """Points (count, 2) evenly along a curve `points_px` (n, 2)."""
-    lengths = np.linalg.norm(np.diff(points_px, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    places = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(places, along, points_px[:, k]) for k in range(2)], axis=1)
 
 
 def smooth_error(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.geometry.polylines import evenly_along, lengths_along
+
 
 def resampled(points_px: np.ndarray, step_px: float, most: int) -> tuple[np.ndarray, float]:
     """Points (n, 2) evenly along a curve points_px (m, 2), about `step_px` apart, at most `most`; and the step."""
-    lengths = np.linalg.norm(np.diff(points_px, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    count = int(np.clip(np.ceil(along[-1] / step_px), 1, most - 1)) + 1
-    places = np.linspace(0.0, along[-1], count)
-    points = np.stack([np.interp(places, along, points_px[:, k]) for k in range(2)], axis=1)
-    return points, along[-1] / (count - 1)
+    length_px = lengths_along(points_px)[-1]
+    count = int(np.clip(np.ceil(length_px / step_px), 1, most - 1)) + 1
+    return evenly_along(points_px, count), length_px / (count - 1)
 
 
 def first_self_crossing(points_px: np.ndarray) -> tuple[int, int] | None:

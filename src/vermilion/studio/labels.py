@@ -12,6 +12,7 @@ import numpy as np
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
+from vermilion.geometry.polylines import lengths_along, points_at
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.storage.files import write_text
 from vermilion.studio.surface import SKIN, Surface
@@ -133,9 +134,9 @@ def _smoothed(loop: np.ndarray, reach: int) -> np.ndarray:
 
 def _resampled(loop: np.ndarray, step_px: float) -> np.ndarray:
     closed = np.concatenate([loop, loop[:1]])
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    places = np.linspace(0, length[-1], max(int(length[-1] / step_px), 8), endpoint=False)
-    return np.stack([np.interp(places, length, closed[:, c]) for c in range(2)], axis=1)
+    length_px = lengths_along(closed)[-1]
+    count = max(int(length_px / step_px), 8)
+    return points_at(closed, np.linspace(0.0, length_px, count, endpoint=False))
 
 
 def write_contours(path: str | Path, image: str, loops: dict[str, np.ndarray]) -> None:
