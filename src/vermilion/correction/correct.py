@@ -1,7 +1,6 @@
 """Corrected meshes of a take: one path for evaluation, application, propagation and the oracle.
 
     corrected_mm = correct(model, take, settings)  # (F, V, 3), world
-    corrected_mm = correct_by_image(mask, take, settings)  # without a regressor
 
 A frame that is not usable (`CoarseTake.usable`) keeps its coarse mesh. The others are taken to the head
 frame, corrected there by the integration of layers, made to agree with their image, and taken back. To
@@ -84,26 +83,6 @@ def correct_with_layers(
     targets_mm = None if displacement_mm is None else displacement_mm[rows]
     head_mm = integrator.integrate(_in_head(take[rows]), layers[rows], targets_mm)
     return _in_world(take, rows, head_mm, _agreement(integrator, take, settings))
-
-
-def correct_by_image(
-    mask: np.ndarray, take: CoarseTake, settings: CorrectionSettings
-) -> np.ndarray:
-    """Meshes of a take moved by its image contours alone: nothing is regressed.
-
-    Args:
-        mask: (T,) triangle ids that may deform (`correspondence.neutral.model_mouth_mask`).
-        take: the coarse track.
-        settings: how takes are corrected; without `image`, the coarse meshes come back.
-
-    Returns:
-        (F, V, 3) float64, world, mm; coarse where a frame is not usable.
-    """
-    integrator = LayerIntegrator(
-        take.neutral_mm, take.triangles, mask, settings.seam_mm, settings.detail_mm
-    )
-    rows = take.usable(take.features)
-    return _in_world(take, rows, _in_head(take[rows]), _agreement(integrator, take, settings))
 
 
 class Corrector:

@@ -2,17 +2,20 @@
 
 import numpy as np
 
+from vermilion.baselines.null import NAME as NULL
+from vermilion.baselines.null import null_model
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correction.coarse_take import CoarseTake
-from vermilion.correction.correct import CorrectionSettings, correct, correct_by_image
+from vermilion.correction.correct import CorrectionSettings, correct
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
 from vermilion.correction.surface_quality import LipSurface, surface_figures
 from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.neutral import model_mouth_mask
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
+from vermilion.features.vector import FeatureTable
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.video import write_video
@@ -36,7 +39,7 @@ def quality_row(frame, tracked, has_features, figures, surface):
 
 
 def corrected_take(inputs, tracker, fit, cfg, frames, fps):
-    """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor, None where there is none."""
+    """The frames' coarse take, their corrected meshes (F, V, 3), and the regressor; `null` where none is asked for."""
     options = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
     )
@@ -44,23 +47,23 @@ def corrected_take(inputs, tracker, fit, cfg, frames, fps):
         tracker, fit, Identity.load(inputs.identity).neutral_mm, inputs.coarse, inputs.features,
         frames, options.reach_frames(fps),
     )  # fmt: skip
-    settings, model = CorrectionSettings.of(options.at(fps)), None
     if inputs.model:
         pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
         model = with_known_neutrals(load_model(inputs.model), tracker.triangles, *pairs)
-        corrected = correct(model, take, settings)
     else:
         region = CorrespondenceConfig(**cfg["correspondence"]).model_dump(exclude={"landmarks"})
         mask = model_mouth_mask(tracker, take.neutral_mm, CorrespondenceSettings(**region))
-        corrected = correct_by_image(mask, take, settings)
+        names = FeatureTable.load(inputs.features[0]).names
+        model = null_model(tracker.triangles, mask, names)
+    corrected = correct(model, take, CorrectionSettings.of(options.at(fps)))
     asked = np.searchsorted(take.frames, frames)
     return take[asked], corrected[asked], model
 
 
 def novelty_of(model, take):
-    """Novelty (F,) of each frame and its limit; NaN without a regressor or without features."""
+    """Novelty (F,) of each frame and its limit; NaN without features, and where nothing was learnt."""
     novelty = np.full(len(take), np.nan)
-    if model is None:
+    if model.name == NULL:
         return novelty, np.nan
     known = np.isfinite(take.features).all(axis=1)
     novelty[known] = model.novelty(take.features[known], take.neutral_mm)
@@ -99,7 +102,7 @@ def main(snakemake):
 
     source, camera = open_frames(params.source, *place), fit.camera
     view = framing(tracker, take.neutral_mm, fit, overlay.margin, overlay.panel_height_px)
-    after = f"corrected, {model.name}" if model else "with contours"
+    after = "with contours" if model.name == NULL else f"corrected, {model.name}"
     images = overlay_frames(
         view, camera, lambda frame: to_display(source.read(params.camera, frame)), frames,
         fit.index_of(frames), take.valid,
