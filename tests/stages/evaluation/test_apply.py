@@ -21,8 +21,8 @@ from vermilion.tracking.external.read import read_tracked
 pytestmark = pytest.mark.slow
 
 
-def apply_chunk(scene, frames, images, out):
-    """Correct some frames as one chunk."""
+def apply_chunk(scene, frames, images, out, model=None):
+    """Correct some frames as one chunk, by MS or by another model; [] is none."""
     take = scene.root / f"takes/{SUBJECT}/rom"
     first, last = frames[0], frames[-1]
     name = f"{first:06d}-{last:06d}"
@@ -30,7 +30,7 @@ def apply_chunk(scene, frames, images, out):
         "apply/apply",
         wildcards={"subject": SUBJECT, "take": "rom"},
         params={
-            "cfg": CFG, "frames": list(frames), "fps": 25.0, "source": str(images), "camera": "face2"
+            "cfg": {**CFG, "correspondence": {}}, "frames": list(frames), "fps": 25.0, "source": str(images), "camera": "face2"
         },
         input={
             "tracker": scene.root / "face/tracker.npz",
@@ -38,7 +38,7 @@ def apply_chunk(scene, frames, images, out):
             "fit": take / "tracking/fit.npz",
             "coarse": [take / f"tracking/C/{c}.npy" for c in CHUNKS],
             "features": [take / f"features/{c}.npz" for c in CHUNKS],
-            "model": scene.root / "models/MS.h5",
+            "model": scene.root / "models/MS.h5" if model is None else model,
         },
         output={
             "corrected": out / f"{name}.npy",
@@ -106,3 +106,16 @@ def test_apply_does_not_depend_on_chunks_and_writes_all_formats(scene, tmp_path)
         back = read_tracked(out / file, range(12))
         assert np.linalg.norm(back.vertices_mm - at_once, axis=2).max() < limit, file
     assert len(list((out / "obj").glob("*.obj"))) == 12
+
+
+def test_without_a_regressor_and_without_found_contours_the_base_track_comes_out(scene, tmp_path):
+    for frame in range(12):
+        write_srgb8(tmp_path / f"{frame:06d}.png", np.full((400, 320, 3), 100, np.uint8))
+    name = apply_chunk(scene, range(12), tmp_path, tmp_path / "out", model=[])
+    moved = read_sequence(tmp_path / f"out/{name}.npy")
+    coarse = read_sequence([scene.root / f"takes/{SUBJECT}/rom/tracking/C/{c}.npy" for c in CHUNKS])
+    assert np.abs(moved - coarse[:12]).max() < 1e-3
+    rows = read_table(tmp_path / f"out/{name}.tsv")
+    # Nothing was learnt, so that no frame is outside of it.
+    assert rows["novelty"].isna().all()
+    assert not rows["reason"].fillna("").str.contains("span").any()

@@ -15,11 +15,11 @@ from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.neutral import model_mouth_mask
 from vermilion.export.shots import framing, overlay_frames
 from vermilion.faces.model import FaceModel
-from vermilion.features.vector import FeatureTable
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.video import write_video
 from vermilion.regression.model import load_model
+from vermilion.storage.arrays import read_arrays
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
@@ -53,7 +53,7 @@ def corrected_take(inputs, tracker, fit, cfg, frames, fps):
     else:
         region = CorrespondenceConfig(**cfg["correspondence"]).model_dump(exclude={"landmarks"})
         mask = model_mouth_mask(tracker, take.neutral_mm, CorrespondenceSettings(**region))
-        names = FeatureTable.load(inputs.features[0]).names
+        names = read_arrays(inputs.features[0], "features", ["names"])["names"].tolist()
         model = null_model(tracker.triangles, mask, names)
     corrected = correct(model, take, CorrectionSettings.of(options.at(fps)))
     asked = np.searchsorted(take.frames, frames)
