@@ -1,7 +1,5 @@
 """The page of a take in a real browser, as wide as a desk's and as a phone's."""
 
-import shutil
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,12 +8,8 @@ from vermilion.imaging.video import write_video
 from vermilion.report.lips_page import TakePage, take_page
 
 sync_api = pytest.importorskip("playwright.sync_api")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path"),
-]
+pytestmark = pytest.mark.slow
 FRAMES, FPS, BAD = 50, 25.0, 30
 
 
@@ -41,32 +35,30 @@ def page_file(tmp_path_factory):
 
 
 @pytest.mark.parametrize("size_px", [(1366, 900), (390, 844)])
-def test_the_video_plays_and_the_time_line_leads_to_its_frames(page_file, size_px):
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": size_px[0], "height": size_px[1]})
-        said, asked = [], []
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(page_file.as_uri())
-        page.wait_for_function("document.getElementById('shot').readyState >= 2")
-        width = page.evaluate("document.documentElement.scrollWidth")
-        assert width <= size_px[0], "the page is wider than the window"
-        assert page.evaluate("document.getElementById('shot').videoWidth") == 160
+def test_the_video_plays_and_the_time_line_leads_to_its_frames(chromium, page_file, size_px):
+    page = chromium.new_page(viewport={"width": size_px[0], "height": size_px[1]})
+    said, asked = [], []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(page_file.as_uri())
+    page.wait_for_function("document.getElementById('shot').readyState >= 2")
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width <= size_px[0], "the page is wider than the window"
+    assert page.evaluate("document.getElementById('shot').videoWidth") == 160
 
-        line = page.locator("#line")
-        line.scroll_into_view_if_needed()
-        box = line.bounding_box()
-        left, right = 108, 8
-        share = (BAD + 0.5) / FRAMES
-        line.click(position={"x": left + share * (box["width"] - left - right), "y": 8})
-        text = page.locator("#said")
-        sync_api.expect(text).to_have_text(f"frame {100 + BAD}: track: lost")
-        page.keyboard.press("ArrowRight")
-        sync_api.expect(text).to_have_text(f"frame {100 + BAD + 1}")
-        page.click("#play")
-        page.wait_for_function("!document.getElementById('shot').paused")
-        browser.close()
+    line = page.locator("#line")
+    line.scroll_into_view_if_needed()
+    box = line.bounding_box()
+    left, right = 108, 8
+    share = (BAD + 0.5) / FRAMES
+    line.click(position={"x": left + share * (box["width"] - left - right), "y": 8})
+    text = page.locator("#said")
+    sync_api.expect(text).to_have_text(f"frame {100 + BAD}: track: lost")
+    page.keyboard.press("ArrowRight")
+    sync_api.expect(text).to_have_text(f"frame {100 + BAD + 1}")
+    page.click("#play")
+    page.wait_for_function("!document.getElementById('shot').paused")
+    page.close()
     assert said == []
     assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
