@@ -45,6 +45,7 @@ export async function open(run) {
   byId("log").hidden = true;
   table({});
   if (["running", "cancelling"].includes(run.state)) { state = "watching"; show(run); return; }
+  shown = run.started;  // A run that ended before this one is not its end.
   state = "counting";
   say("Counting the jobs...");
   try {
