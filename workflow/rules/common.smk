@@ -14,7 +14,7 @@ from snakemake.settings.types import ExecMode
 from vermilion.config.load import load_configuration
 from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
-from vermilion.storage.errors import ConfigurationError
+from vermilion.storage.errors import ConfigurationError, VermilionError
 from vermilion.config.regressors import (
     regressors_of,
     regressors_of_study,
@@ -259,6 +259,10 @@ def record_checksums():
             if str(output).startswith(f"{R}/") and path.exists():
                 jobs[path] = Path(job.output[0])
                 ends[path] = getattr(workflow.persistence.metadata(output), "endtime", None)
-    refused = checksums.record(Path(R), jobs, ends.get)
+    try:
+        refused = checksums.record(Path(R), jobs, ends.get)
+    except VermilionError as error:
+        print(error, file=sys.stderr)
+        return
     for damage in refused:
         print(f"not to be trusted: {damage.path}: {damage.reason}", file=sys.stderr)
