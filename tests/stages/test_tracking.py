@@ -8,7 +8,7 @@ import pytest
 from tests.stages.run_script import run_script
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
-from vermilion.config.tracking import ExternalConfig, MeshesConfig, TrackingConfig
+from vermilion.config.tracking import MeshesConfig, TrackingConfig
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
 from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import read_image, write_image
@@ -139,32 +139,50 @@ def test_frames_without_landmarks_are_flagged_and_interpolated(results, tmp_path
     assert np.linalg.norm(meshes[6] - whole[6], axis=-1).mean() < 12.0  # mm, of a quick motion
 
 
-CFG_EXTERNAL = {"tracking.external": ExternalConfig().model_dump()}
+CFG_EXTERNAL = {f"tracking.external.{key}": None for key in ("unit_mm", "up", "mesh")}
 
 
 def test_topology_and_sequences_of_other_trackers(results, tmp_path):
     _, meshes = results
     run_script(
-        "tracking/tracked_meshes",
-        wildcards={"subject": "s", "take": "t"},
-        params={"cfg": CFG_EXTERNAL, "frames": [3, 4, 500], "fps": 25.0},
-        input={"source": _archive(tmp_path, meshes)},
-        output={"meshes": tmp_path / "C.npy", "quality": tmp_path / "quality.tsv"},
-    )
-    read = read_sequence(tmp_path / "C.npy")
-    assert np.array_equal(read[:2], meshes[3:5])
-    assert np.isnan(read[2]).all()
-    quality = read_table(tmp_path / "quality.tsv")
-    assert quality["valid"].tolist() == [1, 1, 0]
-    assert "not in other.npz; export this frame again" in quality["reason"].iloc[2]
-    run_script(
         "tracking/tracked_topology",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": CFG_EXTERNAL, "frames": [-1, 3, 4], "fps": 25.0},
-        input={"source": tmp_path / "other.npz"},
-        output={0: tmp_path / "topology.ply"},
+        input={"source": _archive(tmp_path, meshes)},
+        output={"topology": tmp_path / "topology.ply", "sequence": tmp_path / "sequence.npz"},
     )
     assert np.array_equal(read_mesh(tmp_path / "topology.ply").triangles, MODEL.triangles)
+    read, quality = read_chunk(tmp_path, [3, 4, 500])
+    assert np.array_equal(read[:2], meshes[3:5])
+    assert np.isnan(read[2]).all()
+    assert quality["valid"].tolist() == [1, 1, 0]
+    assert "not in other.npz; export this frame again" in quality["reason"].iloc[2]
+
+
+def test_a_chunk_without_a_mesh_loses_its_frames_alone(results, tmp_path):
+    _, meshes = results
+    run_script(
+        "tracking/tracked_topology",
+        wildcards={"subject": "s", "take": "t"},
+        params={"cfg": CFG_EXTERNAL, "frames": [3], "fps": 25.0},
+        input={"source": _archive(tmp_path, meshes)},
+        output={"topology": tmp_path / "topology.ply", "sequence": tmp_path / "sequence.npz"},
+    )
+    read, quality = read_chunk(tmp_path, [500, 501])
+    assert read.shape == (2, *meshes.shape[1:]) and np.isnan(read).all()
+    assert quality["valid"].tolist() == [0, 0]
+
+
+def read_chunk(folder, frames):
+    """Meshes and quality rows of a chunk of the archive."""
+    run_script(
+        "tracking/tracked_meshes",
+        wildcards={"subject": "s", "take": "t"},
+        params={"cfg": CFG_EXTERNAL, "frames": frames, "fps": 25.0},
+        input={"source": folder / "other.npz", "sequence": folder / "sequence.npz"},
+        output={"meshes": folder / "C.npy", "quality": folder / "quality.tsv"},
+    )
+    return read_sequence(folder / "C.npy"), read_table(folder / "quality.tsv")
 
 
 def _archive(folder, meshes):

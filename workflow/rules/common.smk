@@ -11,6 +11,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 from snakemake.exceptions import WorkflowError
 from snakemake.settings.types import ExecMode
 
+from vermilion.config.external_base import sequences_of
 from vermilion.config.load import load_configuration
 from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
@@ -43,6 +44,8 @@ include: "resources.smk"
 
 
 _TAKES = {take.name: take for take in TAKES}
+#: Name of a take -> the row of another tracker's sequence that is its base; empty: our own tracker's is.
+EXTERNAL = sequences_of(TAKES)
 
 
 wildcard_constraints:
@@ -228,11 +231,18 @@ def take_fps(wildcards):
     return take_of(wildcards).fps
 
 
-def tracker_of(wildcards):
-    """The tracker's face model for a subject: their own, made from a scan, or everybody's."""
-    if wildcards.subject in CONFIG.tracking.scans:
-        return P.own_tracker.format(subject=wildcards.subject)
+def base_model(wildcards=None):
+    """Everybody's face model of the base's topology: the tracker's, or another tracker's."""
+    if EXTERNAL:
+        return CONFIG.tracking.external.base.model or P.external_model
     return P.tracker
+
+
+def tracker_of(wildcards):
+    """The base's face model for a subject: their own, made from a scan, or everybody's."""
+    if wildcards.subject in CONFIG.tracking.scans and not EXTERNAL:
+        return P.own_tracker.format(subject=wildcards.subject)
+    return base_model()
 
 
 def mono_camera(wildcards):

@@ -85,7 +85,7 @@ def takes_that_train():
 rule lip_shapes:
     """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
     input:
-        tracker=P.tracker,
+        tracker=base_model,
         correspondence=expand(P.correspondence, subject=trained_subjects()),
         accurate=of_takes(P.accurate, takes_that_train()),
         accurate_quality=of_takes(P.multiview_quality, takes_that_train()),

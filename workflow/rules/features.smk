@@ -6,7 +6,7 @@ rule features:
     input:
         images=chunk_images,
         # Everybody's model, also for those with a scan: shape features have one basis for all people.
-        model=P.tracker,
+        model=base_model,
         identity=P.identity,
         fit=P.fit,
         coarse=P.coarse,

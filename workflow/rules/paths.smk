@@ -106,6 +106,14 @@ class P:
     residuals = _TAKE + "/tracking/residuals/{step}/{chunk}.tsv"
     residuals_overlay = _TAKE + "/tracking/residuals/overlay/{chunk}.png"
 
+    # tracking: another tracker's sequence as the base
+    sequence = _TAKE + "/tracking/sequence.npz"
+    external_model = R + "/face_model/external.npz"
+    external_topology = R + "/face_model/external/topology.npz"
+    external_landmarks = R + "/face_model/external/landmarks.tsv"
+    external_overlay = R + "/face_model/external/overlay.png"
+    placement = _TAKE + "/tracking/placement.npz"
+
     # detail
     flow = _TAKE + "/detail/flow/{chunk}.npy"
     flow_quality = _TAKE + "/detail/quality/{chunk}.tsv"

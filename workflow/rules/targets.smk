@@ -44,7 +44,7 @@ def clip_outputs():
 def subject_outputs():
     """Files of every subject of the database, and identities of all that are tracked."""
     tracked = list(dict.fromkeys(take.subject for take in used_takes(TRACKED_ROLES)))
-    imaged = [subject for subject in tracked if subject in image_identity_subjects()]
+    imaged = [] if EXTERNAL else [s for s in tracked if s in image_identity_subjects()]
     return [
         *expand(P.identity, subject=tracked),
         *expand(P.identity_overlay, subject=imaged),

@@ -10,6 +10,11 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vermilion.config.cross_checks import cross_checks
+from vermilion.config.external_base import (
+    external_problems,
+    with_external_base,
+    with_frames_of_images,
+)
 from vermilion.config.moved import earlier_key, earlier_keys
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
@@ -46,7 +51,8 @@ def load_configuration(
         problems += [_sentence(origin, item) for item in unknown]
     sheet = raw.get("takes", Configuration.model_fields["takes"].default)
     takes, wrong = read_takes(str(sheet))
-    problems += wrong
+    problems += wrong + [f"{sheet}: {problem}" for problem in external_problems(takes)]
+    takes = with_frames_of_images(takes)
     if configuration is not None:
         problems += [f"{origin}, key {problem}" for problem in cross_checks(configuration, takes)]
     if check_disk:
@@ -56,7 +62,7 @@ def load_configuration(
     if problems:
         raise ConfigurationError(problems)
     assert configuration is not None
-    return configuration, takes
+    return with_external_base(configuration, takes), takes
 
 
 def read_keys(path: str | Path) -> dict[str, Any]:
@@ -86,9 +92,14 @@ def check_source(take: Take, reading: ImageReading = AS_TAGGED) -> list[str]:
 
     Headers alone are read: of a video, and of the first image of each camera.
     """
+    source = Path(take.source)
+    if take.of and not source.exists():
+        return [
+            f"source: found no '{source}'; expected the mesh sequence of another tracker. Correct the "
+            "path (relative to the folder where the workflow starts)."
+        ]
     if take.source == STUDIO or take.role == "tracked":
         return []
-    source = Path(take.source)
     wanted = f"frames {take.first} to {take.last}"
     if not source.exists():
         return [

@@ -61,6 +61,11 @@ def take_sheet_schema() -> dict[str, Any]:
             "image's longer side (millimetres of a full-frame lens over 36). Empty: estimated. The column may "
             "be left out.",
         },
+        "of": {
+            "type": "string",
+            "description": "Of a `tracked` row: the take of the same subject whose images the sequence was "
+            "tracked in, and whose base it is. Empty: none. The column may be left out.",
+        },
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vermilion.config.external_base import sequences_of
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take
 
@@ -10,9 +11,11 @@ def without_skipped(
     configuration: Configuration, takes: list[Take]
 ) -> tuple[Configuration, list[Take]]:
     """The configuration and the sheet as if the takes of `skip_takes` had never been named."""
-    skipped = configuration.skip_takes
+    skipped = set(configuration.skip_takes)
     if not skipped:
         return configuration, takes
+    # A take without its base is left out with it.
+    skipped |= {name for name, row in sequences_of(takes).items() if row.name in skipped}
 
     def kept(names: list[str]) -> list[str]:
         return [name for name in names if name not in skipped]

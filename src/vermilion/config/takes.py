@@ -16,7 +16,7 @@ from vermilion.storage.errors import InputError
 Role = Literal["tattoo", "plain", "video", "tracked"]
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
 #: Columns that may be left out.
-OPTIONAL_COLUMNS = ("face", "focal")
+OPTIONAL_COLUMNS = ("face", "focal", "of")
 #: What a split may be.
 SPLIT = r"train|test|none|test:\d+-\d+(,\d+-\d+)*"
 #: `source` of a take that the studio makes.
@@ -38,6 +38,8 @@ class Take:
             rest trains).
         face: which of several faces is followed: none, (x, y) or (left, top, right, bottom), pixels.
         focal: known focal length of a single camera, in lengths of the image's longer side; None: not known.
+        of: take of the same subject whose images a `tracked` sequence was tracked in; it has that take's
+            frames and is its base. Empty: none.
     """
 
     subject: str
@@ -50,6 +52,7 @@ class Take:
     split: str
     face: tuple[float, ...] = ()
     focal: float | None = None
+    of: str = ""
 
     @property
     def name(self) -> str:
@@ -140,7 +143,9 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
                 f"{name}: found '{value[name]}'; expected "
                 f"{'a whole number' if kind is int else 'a number'}."
             )
-    if open_ends and not wrong:
+    if value["of"]:
+        numbers |= dict.fromkeys(set(open_ends), 0)  # those of the images come later
+    elif open_ends and not wrong:
         numbers, reason = _with_range(value, numbers, open_ends)
         wrong += [reason] if reason else []
     if {"first", "last"} <= numbers.keys() and not 0 <= numbers["first"] <= numbers["last"]:
@@ -167,6 +172,7 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
         split,
         face,
         focal,
+        value["of"],
     )
     return take, []
 

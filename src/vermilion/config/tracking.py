@@ -157,6 +157,41 @@ class MeshesConfig(StageConfig):
     )
 
 
+class ExternalBaseConfig(StageConfig):
+    """Sequences of another tracker as the base of the correction: rows `tracked` with a take in `of`."""
+
+    world: Literal["guess", "capture", "landmarks"] = Field(
+        "guess",
+        description="World of the sequence: that of the capture's cameras (`capture`), or one that is found "
+        "by the landmarks in the images, one rigid motion a take (`landmarks`). `guess`: that of the "
+        "capture where the mesh projects on the face.",
+    )
+    weights: str | None = Field(
+        None,
+        description="Blend weights of the tracker, a CSV a take: a column `frame` and one a blend shape, "
+        "with {subject}, {take} and {of} of the `tracked` row in the path. Empty: shape features are "
+        "coefficients of the modes of the training frames.",
+    )
+    landmarks: str | None = Field(
+        None,
+        description="Landmarks on the neutral of the first training take: a TSV with columns landmark (0 "
+        "to 65), x, y, z in millimetres, in the sequence's frame. Empty: they are detected in rendered "
+        "views.",
+    )
+    model: str | None = Field(
+        None,
+        description="`face_model/external.npz` of another run of the same tracker, for a regressor that "
+        "was trained there (`apply.model`). Empty: it is made.",
+    )
+    variance: float = Field(
+        0.999,
+        gt=0,
+        le=1,
+        description="Share of the variance of the training frames that the modes hold (share).",
+    )
+    modes: int = Field(40, ge=1, le=500, description="Modes at most (count).")
+
+
 class ExternalConfig(StageConfig):
     """Mesh sequences of other trackers (takes of role `tracked`)."""
 
@@ -175,6 +210,9 @@ class ExternalConfig(StageConfig):
     mesh: str | None = Field(
         None,
         description="Path or name of the mesh in files that have several. Empty: the only one that moves.",
+    )
+    base: ExternalBaseConfig = section(
+        ExternalBaseConfig, "The sequence as the base of the correction (docs/other_trackers.md)."
     )
 
 

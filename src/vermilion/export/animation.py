@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -53,8 +54,8 @@ class Animation:
     Attributes:
         frames: (F,) increasing frame numbers.
         fps: frames a second.
-        vertices_mm: (F, V, 3) world; memory-mapped where it is long. A frame that is not finite
-            has no mesh, and is left out of the files.
+        vertices_mm: (F, V, 3) world, or what gives a frame's by its row; memory-mapped where it is long.
+            A frame that is not finite has no mesh, and is left out of the files.
         polygons: of the V vertices.
         neutral_mm: (V, 3) the person's neutral, head frame.
         head: pose of the head in every frame.
@@ -64,11 +65,13 @@ class Animation:
         camera: of the plate; None: no camera is written.
         albedo: texture file, relative to the exported files; None: none.
         plate: pattern of undistorted image files, relative, with `{frame}`; None: none.
+        up: axis of the files that points up, `y` or `z`; None: y, and a world whose y points down is
+            turned.
     """
 
     frames: np.ndarray
     fps: float
-    vertices_mm: np.ndarray
+    vertices_mm: Any
     polygons: Polygons
     neutral_mm: np.ndarray
     head: HeadFrame
@@ -78,6 +81,7 @@ class Animation:
     camera: Camera | None = None
     albedo: str | None = None
     plate: str | None = None
+    up: str | None = None
 
     @property
     def rows(self) -> list[int]:
@@ -87,4 +91,5 @@ class Animation:
     @property
     def turned_upright(self) -> bool:
         """Whether the world's y points down (an uncalibrated video's world is its camera)."""
-        return self.camera is not None and bool(self.camera.rotation[1, 1] > 0)
+        downwards = self.camera is not None and bool(self.camera.rotation[1, 1] > 0)
+        return self.up is None and downwards

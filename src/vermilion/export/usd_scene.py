@@ -34,7 +34,8 @@ def new_stage(path: str | Path, animation: Animation) -> Iterator[Any]:
         temporary.unlink()  # USD refuses to create a layer over an existing file
         stage = Usd.Stage.CreateNew(str(temporary))
         UsdGeom.SetStageMetersPerUnit(stage, animation.unit_mm / 1000.0)
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        upwards = UsdGeom.Tokens.z if animation.up == "z" else UsdGeom.Tokens.y
+        UsdGeom.SetStageUpAxis(stage, upwards)
         stage.SetFramesPerSecond(animation.fps)
         stage.SetTimeCodesPerSecond(animation.fps)
         stage.SetStartTimeCode(float(animation.frames[0]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import CubicSpline
@@ -35,21 +37,28 @@ def edge_graph(
     return (graph + graph.T).tocsr()
 
 
-def closed_loop(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
-    """Closed vertex loop (n,) through `waypoints` (m,) in order, by shortest paths along edges."""
+def open_path(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
+    """Vertices (n,) of the path through `waypoints` (m,) in order, by shortest paths along edges.
+
+    Raises ValueError where the edges lead from none to the next.
+    """
     waypoints = np.asarray(waypoints)
-    _, previous = csgraph.dijkstra(graph, indices=waypoints, return_predecessors=True)
-    loop: list[int] = []
-    for index, start in enumerate(waypoints):
-        end = waypoints[(index + 1) % len(waypoints)]
+    _, previous = csgraph.dijkstra(graph, indices=waypoints[:-1], return_predecessors=True)
+    whole = [waypoints[:1]]
+    for index, (start, end) in enumerate(itertools.pairwise(waypoints)):
         path = [end]
         while path[-1] != start:
             step = previous[index, path[-1]]
             if step < 0:
                 raise ValueError(f"no path along the edges from vertex {start} to vertex {end}")
             path.append(step)
-        loop += path[:0:-1]
-    return np.array(loop, dtype=np.int32)
+        whole.append(np.array(path[-2::-1]))
+    return np.concatenate(whole).astype(np.int32)
+
+
+def closed_loop(graph: sparse.spmatrix, waypoints: np.ndarray) -> np.ndarray:
+    """Closed vertex loop (n,) through `waypoints` (m,) in order, by shortest paths along edges."""
+    return open_path(graph, np.append(waypoints, waypoints[0]))[:-1]
 
 
 def smooth_loop(

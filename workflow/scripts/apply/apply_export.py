@@ -14,6 +14,7 @@ from vermilion.export.full_topology import FullFace, shapes_on_coarse
 from vermilion.export.live_link import write_live_link
 from vermilion.export.objs import write_obj
 from vermilion.export.overlay import join_videos
+from vermilion.export.own_frame import in_own_frame
 from vermilion.export.packages import write_packages
 from vermilion.export.plates import write_plates
 from vermilion.export.rig import read_rig, solve_rig
@@ -33,6 +34,8 @@ from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
+from vermilion.tracking.external.origin import Origin
+from vermilion.tracking.external.placement import Placement
 from vermilion.tracking.image_fit.overlay import samples_to_vertices
 from vermilion.tracking.result import Identity, TrackedTake
 
@@ -160,6 +163,10 @@ def main(snakemake):
         found = shape_basis(coarse, options.tolerance_mm)
         return found if full is None else full.basis(found)
 
+    if inputs.get("placement"):
+        animation = coarse = in_own_frame(
+            animation, Placement.load(inputs.placement), Origin.load(inputs.sequence)
+        )
     write_packages({name: out[name] for name in options.formats}, animation, basis)
 
 

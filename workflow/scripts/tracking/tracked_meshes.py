@@ -3,6 +3,7 @@
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
+from vermilion.tracking.external.origin import Origin
 from vermilion.tracking.external.read import read_tracked
 
 
@@ -12,23 +13,27 @@ def lost_reason(found):
 
 
 def main(snakemake):
-    params = snakemake.params
+    params, place = snakemake.params, dict(snakemake.wildcards)
+    place = {name: place[name] for name in ("subject", "take")}
+    origin, asked = Origin.load(snakemake.input.sequence), list(params.frames)
+    # With a frame that the file has: a chunk without any is lost, not refused, and its topology compared.
+    known = [] if origin.first in asked else [origin.first]
     sequence = read_tracked(
         snakemake.input.source,
-        params.frames,
-        **params.cfg["tracking.external"],
+        asked + known,
+        origin.unit_mm,
+        up=params.cfg["tracking.external.up"],
+        mesh=params.cfg["tracking.external.mesh"],
         fps=params.fps,
-        subject=snakemake.wildcards.subject,
-        take=snakemake.wildcards.take,
+        **place,
     )
     print(*sequence.understood, sep="\n")
-    write_sequence(snakemake.output.meshes, sequence.vertices_mm)
+    write_sequence(snakemake.output.meshes, sequence.vertices_mm[: len(asked)])
     rows = [
         QualityRow(int(frame), frame not in sequence.lost, lost_reason(sequence.lost.get(frame)))
-        for frame in params.frames
+        for frame in asked
     ]
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    write_quality(snakemake.output.quality, *place, "tracking", rows)
+    write_quality(snakemake.output.quality, *place.values(), "tracking", rows)
 
 
 if __name__ == "__main__":

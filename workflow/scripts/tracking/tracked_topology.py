@@ -1,9 +1,10 @@
-"""The topology of another tracker's mesh sequence."""
+"""The topology of another tracker's mesh sequence, and what was understood of its file."""
 
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
+from vermilion.tracking.external.origin import Origin
 from vermilion.tracking.external.read import read_tracked
 
 
@@ -19,15 +20,20 @@ def first_mesh(source, frames, **options):
 
 
 def main(snakemake):
-    sequence = first_mesh(
+    cfg, output = snakemake.params.cfg, snakemake.output
+    options = {name: cfg[f"tracking.external.{name}"] for name in ("unit_mm", "up", "mesh")}
+    found = first_mesh(
         snakemake.input.source,
         snakemake.params.frames,
-        **snakemake.params.cfg["tracking.external"],
+        **options,
         fps=snakemake.params.fps,
         subject=snakemake.wildcards.subject,
         take=snakemake.wildcards.take,
     )
-    write_ply(snakemake.output[0], Mesh(sequence.vertices_mm[0], sequence.triangles))
+    print(*found.understood, sep="\n")
+    write_ply(output.topology, Mesh(found.vertices_mm[0], found.triangles))
+    first = int(found.frames[0])
+    Origin(found.unit_mm, found.up, found.turned, found.polygons, first).save(output.sequence)
 
 
 if __name__ == "__main__":

@@ -38,6 +38,8 @@ class MeshSequence:
         unit_mm: length of the file's unit.
         lost: frame -> why it is lost.
         understood: what was understood and guessed of the file, sentences.
+        up: axis of the file that points up, as configured, else as the file says, else y.
+        turned: whether the sequence was turned from z up to y up.
     """
 
     frames: np.ndarray
@@ -46,6 +48,8 @@ class MeshSequence:
     unit_mm: float
     lost: dict[int, str] = field(default_factory=dict)
     understood: tuple[str, ...] = ()
+    up: str = "y"
+    turned: bool = False
 
     @property
     def triangles(self) -> np.ndarray:
@@ -99,8 +103,9 @@ def read_tracked(
     axis = f"up axis {up}, as configured" if up else _up(raw)
     understood = (*raw.facts, *_shape(raw), named, axis)
     return MeshSequence(
-        raw.frames, vertices.astype(np.float32), raw.polygons, unit, raw.lost, understood
-    )
+        raw.frames, vertices.astype(np.float32), raw.polygons, unit, raw.lost, understood,
+        up or raw.up or "y", up == "z",
+    )  # fmt: skip
 
 
 def _extent(raw: RawSequence) -> np.ndarray:

@@ -1,0 +1,58 @@
+"""C of a chunk whose base is another tracker's sequence: in the world of the capture, with an overlay."""
+
+from dataclasses import replace
+
+from vermilion.faces.model import FaceModel
+from vermilion.imaging.frames import open_frames
+from vermilion.imaging.images import write_srgb8
+from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.storage.logfile import log_to
+from vermilion.storage.quality import write_quality
+from vermilion.storage.sequences import read_sequence, write_sequence
+from vermilion.storage.tables import read_table
+from vermilion.tracking.external.motion import placed_meshes
+from vermilion.tracking.external.placement import Placement
+from vermilion.tracking.overlay import tracking_overlay
+from vermilion.tracking.result import Identity, TrackedTake
+from vermilion.tracking.validity import quality_rows
+
+
+def reasons_of(path):
+    """Frame -> why the sequence lost it."""
+    table = read_table(path, ["frame", "valid", "reason"])
+    lost = table[table["valid"] == 0]
+    return dict(zip(lost["frame"].astype(int), lost["reason"], strict=True))
+
+
+def main(snakemake):
+    subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
+    inputs, frames = snakemake.input, snakemake.params.frames
+    model, fit = FaceModel.load(inputs.tracker), TrackedTake.load(inputs.fit)
+    rows = fit.index_of(frames)
+    vertices = placed_meshes(
+        model, fit, rows, read_sequence(inputs.coarse), Identity.load(inputs.identity).neutral_mm,
+        Placement.load(inputs.placement),
+    )  # fmt: skip
+    image = tracking_overlay(
+        open_frames(snakemake.params.source, subject, take),
+        fit.camera,
+        model,
+        frames,
+        vertices,
+        LandmarkTrack.load(inputs.landmarks),
+        fit.valid[rows],
+        snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
+    )
+    write_srgb8(snakemake.output.overlay, image)
+    lost = reasons_of(inputs.quality)
+    quality = [
+        replace(row, reason=lost[row.frame]) if row.frame in lost else row
+        for row in quality_rows(fit, rows)
+    ]
+    write_quality(snakemake.output.quality, subject, take, "tracking", quality)
+    write_sequence(snakemake.output.meshes, vertices)
+
+
+if __name__ == "__main__":
+    log_to(snakemake.log[0])
+    main(snakemake)
