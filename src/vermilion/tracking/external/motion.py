@@ -34,7 +34,13 @@ def heads_of(model: FaceModel, own_mm: np.ndarray, neutral_mm: np.ndarray) -> Fr
 def displacements_of(
     model: FaceModel, own_mm: np.ndarray, neutral_mm: np.ndarray
 ) -> tuple[np.ndarray, FrameAlignment]:
-    """Displacements (F, V, 3) from the neutral in the head frame, mm, and the heads; as `heads_of`."""
+    """Displacements (F, V, 3) from the neutral in the head frame, mm, and the heads.
+
+    Args:
+        model: of the topology, for its rigid region.
+        own_mm: (F, V, 3), any world, mm; NaN for a frame that is lost.
+        neutral_mm: (V, 3) head frame.
+    """
     heads = heads_of(model, own_mm, neutral_mm)
     return heads.apply(own_mm) - neutral_mm, heads
 
@@ -141,7 +147,8 @@ def placed_meshes(
     """**C** (F, V, 3) mm in the world of the capture; lost frames from their interpolated pose and weights.
 
     Args:
-        model, neutral_mm, placement: as in `external_take`, which gave the `fit`.
+        model, placement: as in `external_take`, which gave the `fit`.
+        neutral_mm: (V, 3) the person's neutral, head frame.
         rows: (F,) int rows of the fit.
         own_mm: (F, V, 3) the sequence of these rows.
     """

@@ -30,7 +30,7 @@ class Origin:
     first: int
 
     def in_file(self, vertices_mm: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the tracker's world, mm, y up, in the file's frame and unit."""
+        """Points `vertices_mm` (..., 3) of the tracker's world, y up, in the file's frame and unit."""
         points = np.asarray(vertices_mm, dtype=np.float64)
         return points @ self.axes.T / self.unit_mm
 

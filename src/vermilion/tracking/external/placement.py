@@ -50,11 +50,11 @@ class Placement:
     as_given: bool = True
 
     def apply(self, points_mm: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the tracker's world in the capture's, mm."""
+        """The `points_mm` (..., 3) of the tracker's world in the capture's."""
         return points_mm @ self.rotation.T + self.translation_mm
 
     def undo(self, points_mm: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the capture's world in the tracker's, mm."""
+        """The `points_mm` (..., 3) of the capture's world in the tracker's."""
         return (points_mm - self.translation_mm) @ self.rotation
 
     def save(self, path: str | Path) -> None:
