@@ -12,6 +12,7 @@ from tests.stages.run_script import run_script
 from vermilion.appearance.estimate import Appearance
 from vermilion.config.apply import ExportConfig
 from vermilion.export.objs import write_obj
+from vermilion.external.read import read_tracked
 from vermilion.faces import procedural
 from vermilion.geometry.camera import Camera, look_at
 from vermilion.geometry.mesh_files import read_polygons
@@ -19,7 +20,6 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
-from vermilion.tracking.external.read import read_tracked
 from vermilion.tracking.result import Identity, TrackedTake
 
 pytestmark = pytest.mark.slow

@@ -10,6 +10,8 @@ from benchmarks.foreign_tracker import ForeignTracker, write_objs
 from tests.heads import SLIGHTLY_OPEN, small_studio, small_tracker
 from tests.stages.run_script import run_script
 from vermilion.config.tracking import ExternalBaseConfig
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
 from vermilion.imaging.images import read_image, write_image
@@ -17,8 +19,6 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.placement import Placement
 from vermilion.tracking.result import Identity, TrackedTake
 
 N_FRAMES, LOST = 10, 6
@@ -94,7 +94,7 @@ def finished(scene, request):
     out.mkdir()
     weights = str(root / "weights.csv") if request.param else None
     run_script(
-        "tracking/tracked_topology", wildcards=PLACE,
+        "external/tracked_topology", wildcards=PLACE,
         params={"cfg": READING, "frames": range(N_FRAMES), "fps": 30.0},
         input={"source": root / "meshes"},
         output={"topology": out / "topology.ply", "sequence": out / "sequence.npz"},
@@ -102,14 +102,14 @@ def finished(scene, request):
     for chunk in CHUNKS:
         first, last = map(int, chunk.split("-"))
         run_script(
-            "tracking/tracked_meshes", wildcards={**PLACE, "chunk": chunk},
+            "external/tracked_meshes", wildcards={**PLACE, "chunk": chunk},
             params={"cfg": READING, "frames": range(first, last + 1), "fps": 30.0},
             input={"source": root / "meshes", "sequence": out / "sequence.npz"},
             output={"meshes": out / f"own/{chunk}.npy", "quality": out / f"own/{chunk}.tsv"},
         )  # fmt: skip
     own = [out / f"own/{chunk}.npy" for chunk in CHUNKS]
     run_script(
-        "tracking/external_topology",
+        "external/external_topology",
         params={
             "cfg": {"face_model.template_slight_open": SLIGHTLY_OPEN},
             "take": PLACE, "frame": 0,
@@ -127,18 +127,18 @@ def finished(scene, request):
         **PLACE, "frames": list(range(N_FRAMES)), "neutral": 0, "chunks": 2, "weights": weights,
     }  # fmt: skip
     run_script(
-        "tracking/external_model", params={"cfg": base(weights=weights), "takes": [take]},
+        "external/external_model", params={"cfg": base(weights=weights), "takes": [take]},
         input={"topology": out / "labels.npz", "coarse": own, "neutrals": [own[0]]},
         output={"model": out / "external.npz"},
     )  # fmt: skip
     run_script(
-        "tracking/external_identity", wildcards={"subject": "s"},
+        "external/external_identity", wildcards={"subject": "s"},
         params={"take": "shot_ft", "frame": 0},
         input={"model": out / "external.npz", "coarse": own[0]},
         output={"identity": out / "identity.npz"},
     )  # fmt: skip
     run_script(
-        "tracking/external_fit", wildcards={"subject": "s", "take": "shot"},
+        "external/external_fit", wildcards={"subject": "s", "take": "shot"},
         params={
             "cfg": base(weights=weights) | {"tracking.motion.max_reprojection": 0.12},
             "camera": "cam",
@@ -154,7 +154,7 @@ def finished(scene, request):
     for chunk in CHUNKS:
         first, last = map(int, chunk.split("-"))
         run_script(
-            "tracking/external_meshes",
+            "external/external_meshes",
             wildcards={"subject": "s", "take": "shot", "chunk": chunk},
             params={
                 "cfg": {"tracking.meshes": {"overlay_frames": 2}}, "source": str(root),
@@ -219,7 +219,7 @@ def test_another_topology_in_one_run_is_refused(scene, finished, tmp_path):
     np.save(tmp_path / f"{CHUNKS[0]}.npy", meshes)
     with pytest.raises(InputError, match=r"take other, frame 0: found a mesh of \d+ vertices"):
         run_script(
-            "tracking/external_identity", wildcards={"subject": "s2"},
+            "external/external_identity", wildcards={"subject": "s2"},
             params={"take": "other", "frame": 0},
             input={"model": finished / "external.npz", "coarse": tmp_path / f"{CHUNKS[0]}.npy"},
             output={"identity": tmp_path / "identity.npz"},

@@ -145,7 +145,7 @@ CFG_EXTERNAL = {f"tracking.external.{key}": None for key in ("unit_mm", "up", "m
 def test_topology_and_sequences_of_other_trackers(results, tmp_path):
     _, meshes = results
     run_script(
-        "tracking/tracked_topology",
+        "external/tracked_topology",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": CFG_EXTERNAL, "frames": [-1, 3, 4], "fps": 25.0},
         input={"source": _archive(tmp_path, meshes)},
@@ -162,7 +162,7 @@ def test_topology_and_sequences_of_other_trackers(results, tmp_path):
 def test_a_chunk_without_a_mesh_loses_its_frames_alone(results, tmp_path):
     _, meshes = results
     run_script(
-        "tracking/tracked_topology",
+        "external/tracked_topology",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": CFG_EXTERNAL, "frames": [3], "fps": 25.0},
         input={"source": _archive(tmp_path, meshes)},
@@ -176,7 +176,7 @@ def test_a_chunk_without_a_mesh_loses_its_frames_alone(results, tmp_path):
 def read_chunk(folder, frames):
     """Meshes and quality rows of a chunk of the archive."""
     run_script(
-        "tracking/tracked_meshes",
+        "external/tracked_meshes",
         wildcards={"subject": "s", "take": "t"},
         params={"cfg": CFG_EXTERNAL, "frames": frames, "fps": 25.0},
         input={"source": folder / "other.npz", "sequence": folder / "sequence.npz"},

@@ -18,7 +18,7 @@ FLOORS = (
     ("storage", "provenance", "geometry", "imaging"),
     ("config", "faces", "appearance"),
     (
-        "studio", "capture", "landmarks", "multiview", "inpaint", "scan", "tracking", "detail",
+        "studio", "capture", "landmarks", "multiview", "inpaint", "scan", "tracking", "external", "detail",
         "contours", "correspondence", "features",
     ),
     ("regression", "database", "correction", "guided", "baselines", "evaluation"),
@@ -40,7 +40,11 @@ PACKAGE_OF = {
 #: Rule files that are no stage.
 SHARED_RULES = {"common", "paths", "resources", "targets"}
 #: Stages that have no section of their own: what they read belongs to another stage's section.
-WITHOUT_SECTION = {"scan": "tracking.scans", "report": "evaluation.figures"}
+WITHOUT_SECTION = {
+    "scan": "tracking.scans",
+    "external": "tracking.external",
+    "report": "evaluation.figures",
+}
 #: Sections that are no stage: names of files and folders.
 PLAIN_KEYS = {"results", "takes", "chunk_frames", "skip_takes"}
 

@@ -6,14 +6,14 @@ from scipy.spatial.transform import Rotation
 
 from tests.unit.synthetic_face import synthetic_model
 from tests.unit.test_tracking_motion import true_motion
+from vermilion.external.motion import external_take, placed_meshes
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement, place_world
+from vermilion.external.weights_file import read_weights
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.polygons import Polygons
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.motion import external_take, placed_meshes
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.placement import Placement, place_world
-from vermilion.tracking.external.weights_file import read_weights
 from vermilion.tracking.landmark_fit.observation import focal_px, with_focal
 
 MODEL = synthetic_model()

@@ -7,16 +7,16 @@ import pytest
 
 from benchmarks.foreign_tracker import ForeignTracker
 from tests.heads import SLIGHTLY_OPEN, small_studio, small_tracker
-from vermilion.geometry.mesh import Mesh, submesh, unique_edges
-from vermilion.scan.landmarks import ScanLandmarks
-from vermilion.storage.errors import InputError
-from vermilion.tracking.external.shape_modes import (
+from vermilion.external.shape_modes import (
     has_modes,
     mode_weights,
     with_blend_shapes,
     with_modes,
 )
-from vermilion.tracking.external.topology import label_topology
+from vermilion.external.topology import label_topology
+from vermilion.geometry.mesh import Mesh, submesh, unique_edges
+from vermilion.scan.landmarks import ScanLandmarks
+from vermilion.storage.errors import InputError
 
 PERSON = np.array([0.5, -1.0, 0.8, 0.3])
 #: The tracker's own frame: turned, and away from the origin.

@@ -7,12 +7,12 @@ import pytest
 
 from tests.unit.small_videos import mean_difference
 from vermilion.capture.video_facts import rate_warning, video_facts
+from vermilion.external.read import read_tracked
 from vermilion.geometry.camera import read_cameras
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import ImageReading, linear_to_srgb, read_image
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.read import read_tracked
 
 pytestmark = pytest.mark.data
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vermilion.external.read import read_tracked
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.imaging.frames import list_frames
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.read import read_tracked
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from vermilion.export.objs import write_objs, write_plys
 from vermilion.export.shape_basis import shape_basis
 from vermilion.export.usd import write_usd
 from vermilion.export.usd_shapes import write_usd_shapes
+from vermilion.external.read import read_tracked
 from vermilion.geometry.polygons import Polygons
-from vermilion.tracking.external.read import read_tracked
 
 EXACT_MM = 1e-4
 ALEMBIC = pytest.param(

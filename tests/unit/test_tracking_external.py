@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from vermilion.external.read import read_tracked
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.read import read_tracked
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [4, 6, 5], [5, 6, 7]], dtype=np.int32)

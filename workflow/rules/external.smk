@@ -91,11 +91,11 @@ rule tracked_topology:
         runtime=growing(30),
     params:
         cfg=cfg_of(*SEQUENCE_KEYS),
-        code=code_of("tracking/tracked_topology"),
+        code=code_of("external/tracked_topology"),
         frames=lambda wildcards: list(take_of(wildcards).frames),
         fps=take_fps,
     script:
-        "../scripts/tracking/tracked_topology.py"
+        "../scripts/external/tracked_topology.py"
 
 
 rule tracked_meshes:
@@ -117,11 +117,11 @@ rule tracked_meshes:
         runtime=growing(30),
     params:
         cfg=cfg_of(*SEQUENCE_KEYS),
-        code=code_of("tracking/tracked_meshes"),
+        code=code_of("external/tracked_meshes"),
         frames=chunk_frames,
         fps=take_fps,
     script:
-        "../scripts/tracking/tracked_meshes.py"
+        "../scripts/external/tracked_meshes.py"
 
 
 ruleorder: tracked_meshes > tracking_meshes
@@ -153,12 +153,12 @@ if EXTERNAL:
             runtime=growing(30),
         params:
             cfg=detector_cfg("face_model.template_slight_open"),
-            code=code_of("tracking/external_topology"),
+            code=code_of("external/external_topology"),
             model=detector_path,
             take=lambda wildcards: sequence_place(labelled_take()),
             frame=lambda wildcards: neutral_frame(labelled_take()),
         script:
-            "../scripts/tracking/external_topology.py"
+            "../scripts/external/external_topology.py"
 
     rule external_model:
         """Adds the space of the shape coefficients, fitted to the training frames: external.npz."""
@@ -182,10 +182,10 @@ if EXTERNAL:
             runtime=growing(30),
         params:
             cfg=cfg_of("tracking.external.base"),
-            code=code_of("tracking/external_model"),
+            code=code_of("external/external_model"),
             takes=lambda wildcards: list(map(fitted_take, space_takes())),
         script:
-            "../scripts/tracking/external_model.py"
+            "../scripts/external/external_model.py"
 
     rule external_identity:
         """Takes the neutral of a subject on the sequences' topology: subjects/{subject}/identity.npz."""
@@ -203,11 +203,11 @@ if EXTERNAL:
             mem_mb=growing(1000),
             runtime=growing(10),
         params:
-            code=code_of("tracking/external_identity"),
+            code=code_of("external/external_identity"),
             take=lambda wildcards: sequence_of(neutral_take(wildcards.subject)).take,
             frame=lambda wildcards: neutral_frame(neutral_take(wildcards.subject)),
         script:
-            "../scripts/tracking/external_identity.py"
+            "../scripts/external/external_identity.py"
 
     rule external_fit:
         """Finds the sequence's world in the capture's, and the pose of each frame: fit.npz."""
@@ -231,10 +231,10 @@ if EXTERNAL:
             runtime=growing(30),
         params:
             cfg=cfg_of("tracking.external.base", "tracking.motion.max_reprojection"),
-            code=code_of("tracking/external_fit"),
+            code=code_of("external/external_fit"),
             camera=mono_camera,
         script:
-            "../scripts/tracking/external_fit.py"
+            "../scripts/external/external_fit.py"
 
     rule external_meshes:
         """Writes C of a chunk in the world of the capture, and the mesh over the images."""
@@ -260,11 +260,11 @@ if EXTERNAL:
             runtime=growing(60),
         params:
             cfg=cfg_of("tracking.meshes"),
-            code=code_of("tracking/external_meshes"),
+            code=code_of("external/external_meshes"),
             source=chunk_source,
             frames=chunk_frames,
         script:
-            "../scripts/tracking/external_meshes.py"
+            "../scripts/external/external_meshes.py"
 
     ruleorder: external_identity > image_identity > identity
     ruleorder: external_fit > tracking

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vermilion.export.animation import Animation, HeadFrame
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.geometry.camera import Camera
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.placement import Placement
 
 
 @dataclass(frozen=True)

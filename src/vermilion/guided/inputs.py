@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from vermilion.external.read import read_tracked
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh
 from vermilion.guided.sculpt_files import USD_SUFFIXES
 from vermilion.guided.sketch import Sketch, read_sketch
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.read import read_tracked
 
 
 def sketch_cameras(

@@ -11,12 +11,12 @@ from tests.stages.evaluation.conftest import CFG, SUBJECT
 from tests.stages.lip_scene import BAD_FRAME, CHUNKS
 from tests.stages.run_script import run_script
 from vermilion.config.apply import ExportConfig
+from vermilion.external.read import read_tracked
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
-from vermilion.tracking.external.read import read_tracked
 
 pytestmark = pytest.mark.slow
 

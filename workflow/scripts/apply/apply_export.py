@@ -21,6 +21,8 @@ from vermilion.export.rig import read_rig, solve_rig
 from vermilion.export.shape_basis import shape_basis
 from vermilion.export.timeline import draw_timeline
 from vermilion.export.weights import write_weights
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
@@ -34,8 +36,6 @@ from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.placement import Placement
 from vermilion.tracking.image_fit.overlay import samples_to_vertices
 from vermilion.tracking.result import Identity, TrackedTake
 

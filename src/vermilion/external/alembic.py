@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from vermilion.external.sequence import RawSequence, Request, filled
+from vermilion.external.usd import reversed_polygons
 from vermilion.geometry.polygons import Polygons
-from vermilion.tracking.external.sequence import RawSequence, Request, filled
-from vermilion.tracking.external.usd import reversed_polygons
 
 
 def read_alembic(request: Request) -> RawSequence:

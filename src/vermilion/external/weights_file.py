@@ -34,7 +34,7 @@ def read_weights(
         InputError: no such file, no column `frame`, no blend shapes or not those that are wanted, or
             values that are no numbers.
     """
-    hint = "See docs/other_trackers.md, or correct tracking.external.weights."
+    hint = "See docs/other_trackers.md, or correct tracking.external.base.weights."
     try:
         table = pd.read_csv(path, skipinitialspace=True)
     except (OSError, ValueError, pd.errors.ParserError) as error:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.polygons import Polygons
-from vermilion.tracking.external.sequence import RawSequence, Request, filled
 
 
 def read_usd(request: Request) -> RawSequence:

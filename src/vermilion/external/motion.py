@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.external.placement import Placement
+from vermilion.external.shape_modes import has_modes, mode_weights
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import FrameAlignment, align_frames, move_frames
 from vermilion.geometry.camera import Camera
@@ -11,8 +13,6 @@ from vermilion.geometry.mesh import vertex_areas
 from vermilion.geometry.rotations import exp_about_mean, log_about_mean
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import JAW, interocular_px
-from vermilion.tracking.external.placement import Placement
-from vermilion.tracking.external.shape_modes import has_modes, mode_weights
 from vermilion.tracking.landmark_fit.start import fill_gaps
 from vermilion.tracking.result import TrackedTake
 

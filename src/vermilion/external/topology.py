@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vermilion.external.lip_loops import LipLoops, lip_loops
 from vermilion.faces.contours import INNER_LOOP, OUTER_LOOP, edge_graph, enclosed, upper_side
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
@@ -15,7 +16,6 @@ from vermilion.landmarks.scheme import EYE_LEFT, EYE_RIGHT, LIP_INNER_OPEN, MOUT
 from vermilion.scan.landmarks import ScanLandmarks
 from vermilion.scan.personal import PersonalModel, personal_model
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.lip_loops import LipLoops, lip_loops
 
 #: Vertices farther from the registered model have none of its labels, mm.
 _REACH_MM = 5.0

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from vermilion.external.alembic import read_alembic
+from vermilion.external.folders import read_archive, read_folder
+from vermilion.external.gltf import read_gltf
+from vermilion.external.sequence import RawSequence, Request
+from vermilion.external.usd import read_usd
 from vermilion.geometry.polygons import Polygons
-from vermilion.tracking.external.alembic import read_alembic
-from vermilion.tracking.external.folders import read_archive, read_folder
-from vermilion.tracking.external.gltf import read_gltf
-from vermilion.tracking.external.sequence import RawSequence, Request
-from vermilion.tracking.external.usd import read_usd
 
 READERS = {
     ".npz": read_archive, ".abc": read_alembic, ".glb": read_gltf, ".gltf": read_gltf,

@@ -6,11 +6,11 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_polygons
 from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.numbering import numbered_files
 from vermilion.storage.errors import InputError
-from vermilion.tracking.external.sequence import RawSequence, Request, filled
 
 
 def read_folder(request: Request) -> RawSequence:

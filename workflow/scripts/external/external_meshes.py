@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from vermilion.external.motion import placed_meshes
+from vermilion.external.placement import Placement
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
@@ -10,8 +12,6 @@ from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
-from vermilion.tracking.external.motion import placed_meshes
-from vermilion.tracking.external.placement import Placement
 from vermilion.tracking.overlay import tracking_overlay
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.validity import quality_rows

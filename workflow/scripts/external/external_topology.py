@@ -1,5 +1,7 @@
 """Our labels on the topology of another tracker: its neutral with our face model laid over it."""
 
+from vermilion.external.overlay import topology_overlay
+from vermilion.external.topology import label_topology, unregistered
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh
@@ -9,8 +11,6 @@ from vermilion.scan.landmarks import find_landmarks, read_landmarks, write_landm
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.external.overlay import topology_overlay
-from vermilion.tracking.external.topology import label_topology, unregistered
 
 
 def neutral_of(inputs, frame, place):

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from vermilion.external.motion import neutral_in_head
 from vermilion.faces.model import FaceModel
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.external.motion import neutral_in_head
 from vermilion.tracking.result import Identity
 
 

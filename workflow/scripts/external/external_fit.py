@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from vermilion.config.tracking import ExternalBaseConfig
+from vermilion.external.motion import external_take
+from vermilion.external.placement import place_world
+from vermilion.external.weights_file import read_weights
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
-from vermilion.tracking.external.motion import external_take
-from vermilion.tracking.external.placement import place_world
-from vermilion.tracking.external.weights_file import read_weights
 from vermilion.tracking.result import Identity
 
 

@@ -1,11 +1,11 @@
 """The topology of another tracker's mesh sequence, and what was understood of its file."""
 
+from vermilion.external.origin import Origin
+from vermilion.external.read import read_tracked
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.read import read_tracked
 
 
 def first_mesh(source, frames, **options):

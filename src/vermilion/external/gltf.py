@@ -11,8 +11,8 @@ from urllib.parse import unquote
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.polygons import Polygons
-from vermilion.tracking.external.sequence import RawSequence, Request, filled
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}

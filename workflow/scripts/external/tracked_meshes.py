@@ -1,10 +1,10 @@
 """A chunk of another tracker's mesh sequence."""
 
+from vermilion.external.origin import Origin
+from vermilion.external.read import read_tracked
 from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
-from vermilion.tracking.external.origin import Origin
-from vermilion.tracking.external.read import read_tracked
 
 
 def lost_reason(found):

@@ -3,12 +3,12 @@
 import numpy as np
 
 from vermilion.config.tracking import ExternalBaseConfig
+from vermilion.external.motion import displacements_of, neutral_in_head
+from vermilion.external.shape_modes import with_blend_shapes, with_modes
+from vermilion.external.weights_file import read_weights
 from vermilion.faces.model import FaceModel
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.logfile import log_to
-from vermilion.tracking.external.motion import displacements_of, neutral_in_head
-from vermilion.tracking.external.shape_modes import with_blend_shapes, with_modes
-from vermilion.tracking.external.weights_file import read_weights
 
 
 def training_frames(model, take, paths, neutral_path):

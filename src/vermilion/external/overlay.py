@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.external.topology import ExternalTopology
 from vermilion.geometry.camera import portrait_camera
 from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label, tile
 from vermilion.scan.overlay import registration_panels
-from vermilion.tracking.external.topology import ExternalTopology
 
 _SIZE_PX, _GROUND = 840, 40
 _COLOURS = {

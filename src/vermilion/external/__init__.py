@@ -1,0 +1,1 @@
+"""Mesh sequences of other trackers: files, and such a sequence as the base of a run."""

@@ -1,1 +1,0 @@
-"""Mesh sequences of other trackers: folders of meshes, `.npz`, USD, Alembic, glTF."""
