@@ -60,7 +60,7 @@ def test_a_capture_is_checked_and_calibrated_from_its_board(tmp_path):
     (source / "frames/mid/000001.png").write_bytes(b"not an image")
     manifests = [check(source, out, [0, 1]), check(source, out, [2])]
     rows = read_table(out / "capture/quality/000000-000001.tsv")
-    assert list(rows["valid"]) == [1, 0] and "mid: unreadable" in rows["reason"][1]
+    assert list(rows["valid"]) == [1, 0] and "mid: an unreadable image" in rows["reason"][1]
     assert json.loads(manifests[1].read_text())["bad"] == {}
     run_script(
         "capture/cameras",

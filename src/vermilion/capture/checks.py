@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import OpenImageIO as oiio
-
+from vermilion.imaging.image_file import open_image
 from vermilion.imaging.images import AS_TAGGED, ImageReading, image_size, shown_size
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import sha256_of
@@ -54,13 +53,10 @@ def check_image(
         return None, "missing"
     if path.stat().st_size == 0:
         return None, "empty file"
-    stream = oiio.ImageInput.open(str(path))
-    if not stream:
-        return None, f"unreadable: {_one_line(oiio.geterror())}"
     try:
+        stream = open_image(path)
         width, height = shown_size(stream, path, reading)
     except InputError as error:
-        stream.close()
         return None, error.brief
     spec = stream.spec()
     pixels = stream.read_image(spec.format)

@@ -11,15 +11,15 @@ import OpenImageIO as oiio
 from vermilion.imaging.colour_space import to_linear
 from vermilion.imaging.display_window import to_display_window
 from vermilion.imaging.exr_layers import choose_layer, layers_of
+from vermilion.imaging.image_file import check_size, is_exr, is_linear, open_image
 from vermilion.imaging.orientation import Orientation, orientation_of_exif
 from vermilion.imaging.pixel_aspect import resample, square_size
 from vermilion.storage.errors import InputError, RefusedInputError
 from vermilion.storage.files import atomic_path
 
 LINEAR_SUFFIXES = (".exr", ".hdr")
-_EXR = ".exr"
 #: Formats whose pixel aspect is one of the image, not of a sheet of paper.
-_WITH_ASPECT = (_EXR, ".dpx")
+_WITH_ASPECT = ("openexr", "dpx")
 IMAGE_SUFFIXES = (
     *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr"),
     *(".dpx", ".bmp", ".tga", ".webp"),
@@ -45,9 +45,6 @@ class ImageReading:
 AS_TAGGED = ImageReading()
 #: Luminance of linear RGB (ITU-R BT.709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-#: Colours beside an alpha channel are not darkened by it.
-_UNASSOCIATED = oiio.ImageSpec()
-_UNASSOCIATED["oiio:UnassociatedAlpha"] = 1
 
 
 def srgb_to_linear(values: np.ndarray) -> np.ndarray:
@@ -73,7 +70,7 @@ def linear_to_srgb(values: np.ndarray) -> np.ndarray:
 
 
 def read_image(path: str | Path, reading: ImageReading = AS_TAGGED, **place) -> np.ndarray:
-    """An image as linear RGB, (h, w, 3) float32, whatever its format.
+    """An image as linear RGB, (h, w, 3) float32, whatever its format (the content's, not the name's).
 
     It is upright (EXIF orientation), has square pixels, and for EXR is the display window. Grey
     becomes three equal channels; alpha is left out. 8 and 16 bit files are taken as sRGB; EXR and
@@ -81,20 +78,20 @@ def read_image(path: str | Path, reading: ImageReading = AS_TAGGED, **place) -> 
     be read whole, or says that it is something else.
     """
     path = Path(path)
-    pixels = _read_pixels(path, reading, place)
+    pixels, linear = _read_pixels(path, reading, place)
     if reading.colour_space:
         if pixels.dtype == np.uint8:
             pixels = pixels * _BYTE
         return to_linear(pixels, reading.colour_space)
     if pixels.dtype == np.uint8:
         return _LINEAR_OF_BYTE[pixels]
-    return pixels if path.suffix.lower() in LINEAR_SUFFIXES else srgb_to_linear(pixels)
+    return pixels if linear else srgb_to_linear(pixels)
 
 
 def read_channels(path: str | Path, **place) -> dict[str, np.ndarray]:
     """Every channel of a file as it is, name -> (h, w) float32."""
     path = Path(path)
-    stream = _open(path, place)
+    stream = open_image(path, **place)
     names = list(stream.spec().channelnames)
     pixels = stream.read_image(oiio.FLOAT)
     stream.close()
@@ -107,7 +104,7 @@ def read_channels(path: str | Path, **place) -> dict[str, np.ndarray]:
 def image_size(path: str | Path, reading: ImageReading = AS_TAGGED, **place) -> tuple[int, int]:
     """(width, height) as `read_image` gives it, from the header alone."""
     path = Path(path)
-    stream = _open(path, place)
+    stream = open_image(path, **place)
     try:
         return shown_size(stream, path, reading, **place)
     finally:
@@ -119,8 +116,7 @@ def shown_size(
 ) -> tuple[int, int]:
     """(width, height) of an open file as `read_image` gives it; the stream is at the image's part."""
     _seek_image(stream, path, reading, place)
-    spec = stream.spec()
-    return _orientation(spec).size(*_square(path, spec, place))
+    return _orientation(stream.spec()).size(*_square(stream, path, place))
 
 
 def refusal(path: Path, reading: ImageReading = AS_TAGGED, **place) -> str:
@@ -178,32 +174,12 @@ def _write(path: str | Path, spec: oiio.ImageSpec, pixels: np.ndarray) -> None:
             raise OSError(f"cannot write {path}: {stream.geterror()}")
 
 
-def _open(path: Path, place: dict) -> oiio.ImageInput:
-    if not path.is_file():
-        raise InputError(
-            "no such file",
-            "an image",
-            "Check the frame range of the take sheet.",
-            path=path,
-            **place,
-        )
-    stream = oiio.ImageInput.open(str(path), _UNASSOCIATED)
-    if not stream:
-        raise InputError(
-            f"a file that is no readable image ({oiio.geterror()})",
-            "PNG, JPEG, TIFF, EXR or DPX",
-            "Export the frame again.",
-            path=path,
-            **place,
-        )
-    return stream
-
-
-def _read_pixels(path: Path, reading: ImageReading, place: dict) -> np.ndarray:
-    """Values (h, w, 3) as stored, laid out as shown: uint8, or float32 for other depths."""
-    stream = _open(path, place)
+def _read_pixels(path: Path, reading: ImageReading, place: dict) -> tuple[np.ndarray, bool]:
+    """Values (h, w, 3) as stored, laid out as shown: uint8, or float32 for other depths; are they linear?"""
+    stream = open_image(path, **place)
     channels = _seek_image(stream, path, reading, place)
-    spec = stream.spec()
+    spec, square, linear = stream.spec(), _square(stream, path, place), is_linear(stream)
+    windows = is_exr(stream)
     kind = oiio.UINT8 if spec.format == oiio.UINT8 else oiio.FLOAT
     pixels = stream.read_image(kind)
     failed = stream.has_error
@@ -216,9 +192,9 @@ def _read_pixels(path: Path, reading: ImageReading, place: dict) -> np.ndarray:
     if pixels.shape[2] < 3:  # grey, with alpha or without
         pixels = np.repeat(pixels[..., :1], 3, axis=2)
     pixels = np.ascontiguousarray(pixels[..., :3])
-    if path.suffix.lower() == _EXR:
+    if windows:
         pixels = to_display_window(pixels, spec)
-    return _orientation(spec).apply(resample(pixels, _square(path, spec, place)))
+    return _orientation(spec).apply(resample(pixels, square)), linear
 
 
 def _seek_image(
@@ -228,9 +204,10 @@ def _seek_image(
 
     Raises InputError where the file says that it is no image as those that are read here.
     """
-    if path.suffix.lower() == _EXR:
+    if is_exr(stream):
         layer = choose_layer(layers_of(stream), reading.exr_layer, path, **place)
         stream.seek_subimage(layer.part, 0)
+        check_size(stream, path, **place)
         first = tuple(range(len(layer.indices)))  # a slice of them is no copy
         return None if layer.indices == first else list(layer.indices)
     transfer = stream.spec().get_string_attribute("dpx:Transfer")
@@ -250,12 +227,13 @@ def _orientation(spec: oiio.ImageSpec) -> Orientation:
     return orientation_of_exif(spec.get_int_attribute("Orientation", 1))
 
 
-def _square(path: Path, spec: oiio.ImageSpec, place: dict) -> tuple[int, int]:
+def _square(stream: oiio.ImageInput, path: Path, place: dict) -> tuple[int, int]:
     """(width, height) with square pixels, not yet turned upright."""
+    spec = stream.spec()
     width, height = spec.width, spec.height
-    if path.suffix.lower() == _EXR:
+    if is_exr(stream):
         width, height = spec.full_width, spec.full_height
-    if path.suffix.lower() not in _WITH_ASPECT:
+    if stream.format_name() not in _WITH_ASPECT:
         return width, height
     try:
         return square_size(width, height, spec.get_float_attribute("PixelAspectRatio", 1.0))

@@ -22,6 +22,13 @@ from vermilion.storage.files import atomic_path
 
 #: Decoded frames that are kept: an interlaced one needs its neighbours.
 _KEPT = 3
+#: Containers that hold their frames. Playlists and lists of files, which FFmpeg would follow to other files
+#: and hosts whatever the file is called, are not among them.
+_CONTAINERS = (
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,mxf,ivf,nut,dv,"
+    "yuv4mpegpipe,h264,hevc,m4v,obu,av1"
+)
+_OPENING = {"format_whitelist": _CONTAINERS, "protocol_whitelist": "file"}
 #: BT.709 among the matrices of H.273.
 _TAG_709 = 1
 
@@ -56,7 +63,7 @@ class VideoReader:
     def __init__(self, path: str | Path, index: VideoIndex | None = None):
         self.path = Path(path)
         try:
-            self._container = av.open(str(self.path))
+            self._container = av.open(str(self.path), options=_OPENING)
             self._stream = _main_stream(self._container)
             self.index = index or _list_packets(self._container, self._stream)
         except (OSError, IndexError, av.FFmpegError) as error:
@@ -70,7 +77,8 @@ class VideoReader:
             raise InputError(
                 "a video without time stamps",
                 "frames that say when they are shown",
-                f"Convert it: `ffmpeg -fflags +genpts -i {self.path.name} -crf 12 converted.mp4`.",
+                "Copy it again where it was cut off, or convert it: "
+                f"`ffmpeg -fflags +genpts -i {self.path.name} -crf 12 converted.mp4`.",
                 path=path,
             )
         self._stream.thread_type = "AUTO"
