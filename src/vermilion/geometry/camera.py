@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pycolmap
 
+from vermilion.geometry.camera_check import check_camera
 from vermilion.geometry.colmap import camera_names, read_model
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
@@ -198,7 +199,12 @@ def read_cameras(folder: str | Path) -> dict[str, Camera]:
     for image_name, name in sorted(camera_names(images).items()):
         image = images[image_name]
         camera = model.cameras[image.camera_id]
-        pose = np.asarray(image.cam_from_world().matrix())
+        transform = image.cam_from_world()
+        pose = np.asarray(transform.matrix())
+        if not np.any(transform.rotation.quat):  # whose matrix is the identity
+            pose = np.full((3, 4), np.nan)
+        size = (camera.width, camera.height)
+        check_camera(folder, name, camera.model_name, camera.params, size, pose)
         found = Camera(
             name, camera.model_name, tuple(camera.params), camera.width, camera.height, pose
         )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
+import codecs
+import math
+import re
 import struct
 import tempfile
 from collections.abc import Iterable
@@ -41,24 +43,66 @@ def read_model(folder: str | Path) -> pycolmap.Reconstruction:
             path=folder,
         )
     binary = paths[0].suffix == ".bin"
+    if not binary:
+        _check_numbers(paths[0], range(4, 99))
+        _check_numbers(paths[1], range(1, 8))
     model = pycolmap.Reconstruction()
     try:
         # Exporters leave the points out, COLMAP wants them, and they may be large: it gets none.
         with tempfile.TemporaryDirectory() as copy:
             for path in paths:
                 if path.stem != "points3D":
-                    shutil.copyfile(path, Path(copy) / path.name)
+                    data = path.read_bytes()  # editors put a byte order mark before text
+                    (Path(copy) / path.name).write_bytes(data.removeprefix(codecs.BOM_UTF8))
             points = Path(copy) / f"points3D{paths[0].suffix}"
             points.write_bytes(struct.pack("<Q", 0) if binary else b"")
             model.read_binary(copy) if binary else model.read_text(copy)
     except Exception as error:  # pycolmap raises several kinds
         raise InputError(
-            f"a COLMAP model that cannot be read ({error})",
+            f"a COLMAP model that cannot be read ({_reason(error)})",
             f"valid {paths[0].name} and {paths[1].name}",
             "Check the files against the COLMAP documentation, or export them again.",
             path=folder,
         ) from error
     return model
+
+
+def _check_numbers(path: Path, columns: range) -> None:
+    """Raise InputError where a row of cameras.txt or images.txt has a number that is not finite."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError) as error:
+        raise _not_finite(path, str(error)) from error
+    rows = [(k, line.split()) for k, line in enumerate(lines, 1) if not line.startswith("#")]
+    if path.stem == "images":  # points follow each image on a line of their own
+        first = next((k for k, (_, words) in enumerate(rows) if words), 0)
+        rows = rows[first::2]
+    for number, words in rows:
+        for word in words[columns.start : columns.stop]:
+            if not _is_finite(word):
+                raise _not_finite(path, f"line {number}: '{word:.20}'")
+
+
+def _is_finite(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
+
+
+def _not_finite(path: Path, found: str) -> InputError:
+    return InputError(
+        f"a COLMAP model that cannot be read ({found})",
+        "finite numbers as the COLMAP documentation has them",
+        "Check the file, or export it again.",
+        path=path,
+    )
+
+
+def _reason(error: Exception) -> str:
+    """What pycolmap says, without its place in COLMAP's source."""
+    text = re.sub(r"\[\S+:\d+\]\s*|Check failed:\s*", "", " ".join(str(error).split()))
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def _lacking(folder: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from vermilion.capture.camera_files.rig_file import (
     pose,
     unreadable,
 )
+from vermilion.storage.json_files import load_json
 
 _METRE_MM = 1000.0
 _HALF = 0.5  # both count pixels from the centre of the first one
@@ -32,14 +32,22 @@ def read_json(path: Path, sizes: Sizes) -> RigFile:
     Raises InputError where the file has neither.
     """
     try:
-        content = json.loads(path.read_text())
+        content = load_json(path)
         if "world_2_cam" in content:
             return _nersemble(content, sizes)
         entries = content.get("KRT", content.get("cameras", content))
         if isinstance(entries, list):
             entries = {_label(entry): entry for entry in entries}
         cameras = {str(name): _camera(entry) for name, entry in entries.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        IndexError,
+        StopIteration,
+    ) as error:
         raise unreadable(path, _WANTED, error) from error
     if not cameras:
         raise unreadable(path, _WANTED, "no camera")

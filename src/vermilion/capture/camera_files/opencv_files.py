@@ -21,6 +21,7 @@ _DISTORTION = ("distortion_coefficients", "dist", "D", "distCoeffs", "distortion
 _ROTATION = ("R", "rotation", "rvec", "Rot")
 _TRANSLATION = ("T", "t", "tvec", "translation")
 _HALF = 0.5  # OpenCV's top-left pixel has its centre at (0, 0)
+_DAMAGED = "empty or damaged"
 _WANTED = "OpenCV YAML with camera_matrix, distortion_coefficients, R and T (camera from world)"
 
 
@@ -32,6 +33,14 @@ def read_opencv(paths: list[Path]) -> RigFile:
 
     Raises InputError where a file cannot be read or a camera lacks matrix or pose.
     """
+    try:
+        return _read(paths)
+    except (cv2.error, SystemError, ValueError) as error:
+        why = str(error).strip().splitlines()[-1] if str(error).strip() else "damaged"
+        raise unreadable(paths[0], _WANTED, _DAMAGED if "cv2" in why else why) from error
+
+
+def _read(paths: list[Path]) -> RigFile:
     stores = {path: _open(path) for path in paths}
     names = [name for store in stores.values() for name in _listed(store)]
     cameras = {}
@@ -51,8 +60,9 @@ def read_opencv(paths: list[Path]) -> RigFile:
 def _open(path: Path) -> Any:
     try:
         store = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    except cv2.error as error:
-        raise unreadable(path, _WANTED, str(error).splitlines()[0]) from error
+        store.getNode("names")  # fails where the file is no map
+    except (cv2.error, SystemError) as error:
+        raise unreadable(path, _WANTED, _DAMAGED) from error
     if not store.isOpened():
         raise unreadable(path, _WANTED, "not opened")
     return store

@@ -13,6 +13,7 @@ from vermilion.capture.camera_files.opencv_files import read_opencv
 from vermilion.capture.camera_files.rig_file import RigFile, Sizes
 from vermilion.capture.camera_files.usd_cameras import read_usd_cameras
 from vermilion.geometry.camera import Camera, read_cameras
+from vermilion.geometry.camera_check import check_camera
 from vermilion.geometry.colmap import model_files
 from vermilion.storage.errors import InputError
 
@@ -57,7 +58,10 @@ def read_given_cameras(folder: str | Path, sizes: Sizes) -> GivenCameras:
     if model_files(folder):
         cameras = read_cameras(folder)
         return GivenCameras(cameras, (f"COLMAP, {len(cameras)} cameras, taken as millimetres",))
-    raw = _read(folder, camera_files(folder), sizes)
+    path, raw = _read(folder, camera_files(folder), sizes)
+    for name, camera in raw.cameras.items():
+        size = camera.size_px or sizes.get(name) or (1, 1)
+        check_camera(path, name, camera.model, camera.params, size, camera.cam_from_world)
     unit, said = _unit(raw)
     cameras = {}
     for name, camera in raw.cameras.items():
@@ -66,28 +70,28 @@ def read_given_cameras(folder: str | Path, sizes: Sizes) -> GivenCameras:
             continue
         pose = camera.cam_from_world.astype(float).copy()
         pose[:, 3] *= unit
-        _check_rotation(folder, name, pose[:, :3])
         cameras[name] = Camera(name, camera.model, camera.params, size[0], size[1], pose)
     return GivenCameras(dict(sorted(cameras.items())), (*raw.facts, said))
 
 
-def _read(folder: Path, paths: list[Path], sizes: Sizes) -> RigFile:
+def _read(folder: Path, paths: list[Path], sizes: Sizes) -> tuple[Path, RigFile]:
+    """The file that cameras were read from (the first of several), and what it holds."""
     by_suffix: dict[str, list[Path]] = {}
     for path in paths:
         by_suffix.setdefault(path.suffix.lower(), []).append(path)
     yaml = [path for suffix in _YAML for path in by_suffix.get(suffix, [])]
     usd = [path for suffix in _USD for path in by_suffix.get(suffix, [])]
     if yaml:
-        return read_opencv(yaml)
+        return yaml[0], read_opencv(yaml)
     if by_suffix.get(".xml"):
-        return read_metashape(by_suffix[".xml"][0])
+        return by_suffix[".xml"][0], read_metashape(by_suffix[".xml"][0])
     if by_suffix.get(".json"):
-        return read_json(by_suffix[".json"][0], sizes)
+        return by_suffix[".json"][0], read_json(by_suffix[".json"][0], sizes)
     if usd:
-        return read_usd_cameras(usd[0], sizes)
+        return usd[0], read_usd_cameras(usd[0], sizes)
     named = [path for path in paths if path.stem.upper() == "KRT"]
     if named:
-        return read_krt(named[0])
+        return named[0], read_krt(named[0])
     raise InputError(
         f"no file of cameras that is known ({', '.join(path.name for path in paths) or 'empty'})",
         "a COLMAP model (cameras.txt and images.txt, or .bin), Metashape's .xml, OpenCV's .yml, USD, "
@@ -126,14 +130,3 @@ def _unit(raw: RigFile) -> tuple[float, str]:
     return _UNITS_MM[name], (
         f"unit guessed: {name}, since the cameras are {distance:.4g} units from what they look at"
     )
-
-
-def _check_rotation(folder: Path, name: str, rotation: np.ndarray) -> None:
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
-        raise InputError(
-            "a pose that is no rotation",
-            "camera from world, x right, y down, z forward, right-handed",
-            "Check the convention of the export.",
-            camera=name,
-            path=folder,
-        )
