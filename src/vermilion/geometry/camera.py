@@ -204,10 +204,8 @@ def read_cameras(folder: str | Path) -> dict[str, Camera]:
         if not np.any(transform.rotation.quat):  # whose matrix is the identity
             pose = np.full((3, 4), np.nan)
         size = (camera.width, camera.height)
-        check_camera(folder, name, camera.model_name, camera.params, size, pose)
-        found = Camera(
-            name, camera.model_name, tuple(camera.params), camera.width, camera.height, pose
-        )
+        found = Camera(name, camera.model_name, tuple(camera.params), *size, pose)
+        check_camera(folder, name, found.model, found.params, size, pose)
         if name in cameras and not np.allclose(cameras[name].cam_from_world, pose, atol=1e-6):
             raise InputError(
                 f"images of camera {name} with different poses ('{image_name}' is one)",

@@ -60,8 +60,8 @@ def read_given_cameras(folder: str | Path, sizes: Sizes) -> GivenCameras:
         return GivenCameras(cameras, (f"COLMAP, {len(cameras)} cameras, taken as millimetres",))
     path, raw = _read(folder, camera_files(folder), sizes)
     for name, camera in raw.cameras.items():
-        size = camera.size_px or sizes.get(name) or (1, 1)
-        check_camera(path, name, camera.model, camera.params, size, camera.cam_from_world)
+        known = camera.size_px or sizes.get(name) or (1, 1)
+        check_camera(path, name, camera.model, camera.params, known, camera.cam_from_world)
     unit, said = _unit(raw)
     cameras = {}
     for name, camera in raw.cameras.items():
