@@ -74,6 +74,13 @@ def _same(one: Polygons, other: Polygons) -> bool:
     return np.array_equal(one.counts, other.counts) and np.array_equal(one.corners, other.corners)
 
 
+def _whole(values: np.ndarray) -> bool:
+    """Whether all are whole numbers, of whatever type."""
+    if values.dtype.kind != "f":
+        return values.dtype.kind in "iu"
+    return bool(np.isfinite(values).all() and (values == np.rint(values)).all())
+
+
 def read_archive(request: Request) -> RawSequence:
     """Read `vertices_mm` (or `vertices`) (F, V, 3), `triangles` or `quads`, and `frames` if there.
 
@@ -98,6 +105,18 @@ def read_archive(request: Request) -> RawSequence:
             "(F, V, 3) and (T, 3)",
             "Export it again.",
         )
+    if vertices.dtype.kind not in "fiu" or not _whole(faces):
+        raise request.error(
+            f"vertices of type {vertices.dtype} and faces of type {faces.dtype}",
+            "numbers, and whole numbers",
+            "Export it again.",
+        )
+    if numbers.shape != (len(vertices),) or not _whole(numbers):
+        raise request.error(
+            f"frames of shape {numbers.shape} and type {numbers.dtype}",
+            f"{len(vertices)} whole numbers, one a mesh",
+            "Export it again.",
+        )
     if faces.min() < 0 or faces.max() >= vertices.shape[1]:
         raise request.error(
             f"a face with vertex {int(faces.max())} of {vertices.shape[1]}",
@@ -107,8 +126,6 @@ def read_archive(request: Request) -> RawSequence:
     rows = {int(number): row for row, number in enumerate(numbers)}
     lost = request.absent(rows)
     meshes = {frame: vertices[rows[frame]] for frame in request.frames if frame in rows}
-    for frame in [frame for frame, mesh in meshes.items() if not np.isfinite(mesh).all()]:
-        lost[frame] = "vertices that are not finite"
     polygons = Polygons(
         np.full(len(faces), faces.shape[1], np.int32), faces.astype(np.int32).ravel()
     )

@@ -17,6 +17,8 @@ from vermilion.geometry.polygons import Polygons
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _METRE_MM = 1000.0
+#: Values that a file may have without storing them.
+_MOST_ZEROS = 10_000_000
 
 
 class _File:
@@ -45,7 +47,11 @@ class _File:
             return self.binary
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2])
-        return (self.request.path.parent / unquote(uri)).read_bytes()
+        folder = self.request.path.parent.resolve()
+        path = (folder / unquote(uri)).resolve()
+        if not path.is_relative_to(folder):
+            raise ValueError(f"the buffer {uri!r:.60} lies outside of the file's folder")
+        return path.read_bytes()
 
     def array(self, index: int) -> np.ndarray:
         """Accessor `index` as (N,) or (N, c)."""
@@ -55,11 +61,14 @@ class _File:
             entry["count"],
             _SIZES[entry["type"]],
         )
-        values = np.zeros((count, width), dtype=kind)
         if "bufferView" in entry:
-            values[:] = self._strided(
+            values = self._strided(
                 entry["bufferView"], entry.get("byteOffset", 0), kind, count, width
-            )
+            ).copy()
+        elif count <= _MOST_ZEROS:
+            values = np.zeros((count, width), dtype=kind)
+        else:
+            raise ValueError(f"an accessor of {count} zeros")
         if "sparse" in entry:
             sparse = entry["sparse"]
             number, at = sparse["count"], sparse["indices"]
@@ -239,6 +248,8 @@ def _chain(file: _File, node: int) -> list[int]:
     parents, chain = file.parents(), [node]
     while chain[-1] in parents:
         chain.append(parents[chain[-1]])
+        if len(chain) > len(file.document["nodes"]):
+            raise ValueError("a node that is its own ancestor")
     return chain
 
 

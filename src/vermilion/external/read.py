@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,15 @@ from vermilion.external.gltf import read_gltf
 from vermilion.external.sequence import RawSequence, Request
 from vermilion.external.usd import read_usd
 from vermilion.geometry.polygons import Polygons
+from vermilion.storage.errors import InputError
 
 READERS = {
     ".npz": read_archive, ".abc": read_alembic, ".glb": read_gltf, ".gltf": read_gltf,
     ".usd": read_usd, ".usda": read_usd, ".usdc": read_usd, ".usdz": read_usd,
 }  # fmt: skip
+NAMES = {".npz": ".npz", ".abc": "Alembic", ".glb": "glTF", ".gltf": "glTF"} | dict.fromkeys(
+    (".usd", ".usda", ".usdc", ".usdz"), "USD"
+)
 #: Units that programs have: name -> millimetres.
 UNITS_MM = {"millimetres": 1.0, "centimetres": 10.0, "decimetres": 100.0, "metres": 1000.0}
 #: Longest side of a face or head in any pose, mm: from a mask to head, neck and shoulders.
@@ -87,9 +91,9 @@ def read_tracked(
     source = Path(source)
     request = Request(source, [int(frame) for frame in frames], fps, mesh, place)
     if source.is_dir():
-        raw = read_folder(request)
+        raw = _checked(read_folder(request), request)
     elif source.suffix.lower() in READERS and source.is_file():
-        raw = READERS[source.suffix.lower()](request)
+        raw = _checked(_read(request), request)
     else:
         raise request.error(
             "no mesh sequence" if source.exists() else "no such file or folder",
@@ -106,6 +110,49 @@ def read_tracked(
         raw.frames, vertices.astype(np.float32), raw.polygons, unit, raw.lost, understood,
         up or raw.up or "y", up == "z",
     )  # fmt: skip
+
+
+def _read(request: Request) -> RawSequence:
+    """What a file holds. Whatever its reader trips over is a fault of the file."""
+    suffix = request.path.suffix.lower()
+    try:
+        return READERS[suffix](request)
+    except InputError:
+        raise
+    except Exception as error:  # libraries of these formats raise kinds of their own
+        raise request.error(
+            f"an unreadable {NAMES[suffix]} file ({type(error).__name__}: {error!s:.200})",
+            "a whole file with one mesh",
+            "Export it again.",
+        ) from error
+
+
+def _checked(raw: RawSequence, request: Request) -> RawSequence:
+    """The sequence, whose frames with vertices that are not finite are lost.
+
+    Raises InputError where its polygons are none of its vertices, or no frame is left.
+    """
+    try:
+        Polygons.of_corners(raw.polygons.counts, raw.polygons.corners, raw.vertices.shape[1])
+    except ValueError as error:
+        raise request.error(
+            f"{error}", "faces of the mesh's vertices", "Export it again."
+        ) from error
+    finite = np.isfinite(raw.vertices).all(axis=(1, 2))
+    lost = {
+        int(frame): "vertices that are not finite"
+        for frame, good in zip(raw.frames, finite, strict=True)
+        if not good
+    }
+    lost |= raw.lost
+    if len(lost) == len(raw.frames):
+        first = int(raw.frames[0])
+        raise request.error(
+            f"no frame that can be used (frame {first}: {lost[first]})",
+            "finite vertices",
+            "Export it again.",
+        )
+    return replace(raw, lost=lost)
 
 
 def _extent(raw: RawSequence) -> np.ndarray:

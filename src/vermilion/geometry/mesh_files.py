@@ -69,12 +69,12 @@ def read_polygons(path: str | Path) -> tuple[np.ndarray, Polygons]:
             vertices, polygons = read_ply(path)
         else:
             mesh = read_mesh(path)
-            vertices, polygons = mesh.vertices_mm, Polygons.of_triangles(mesh.triangles)
+            vertices = mesh.vertices_mm
+            counts = np.full(len(mesh.triangles), 3)
+            polygons = Polygons.of_corners(counts, mesh.triangles.ravel(), len(vertices))
         if len(polygons) == 0:
             raise ValueError("no face")
-        if polygons.corners.min() < 0 or polygons.corners.max() >= len(vertices):
-            raise ValueError(f"a face with a vertex beyond the {len(vertices)} there are")
-    except (OSError, ValueError, IndexError, KeyError) as error:
+    except (OSError, ValueError, IndexError, KeyError, OverflowError, MemoryError) as error:
         raise InputError(
             f"an unreadable mesh ({error})", "OBJ, PLY or STL", "Export the mesh again.", path=path
         ) from error

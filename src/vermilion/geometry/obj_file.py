@@ -32,8 +32,6 @@ def read_obj(path: Path) -> tuple[np.ndarray, Polygons]:
             known.append(len(points))
     if any(len(point) != 3 for point in points):
         raise ValueError("a vertex that has not three coordinates")
-    if any(len(face) < 3 for face in faces):
-        raise ValueError("a face of fewer than three corners")
     vertices = np.array(points, dtype=np.float64).reshape(-1, 3)
     counts = np.array([len(face) for face in faces], dtype=np.int32)
     numbers = np.array([word.partition("/")[0] for word in chain.from_iterable(faces)], dtype=int)
@@ -41,4 +39,4 @@ def read_obj(path: Path) -> tuple[np.ndarray, Polygons]:
     if (numbers == 0).any():
         raise ValueError("a face with vertex 0, and OBJ counts from 1")
     corners = np.where(numbers > 0, numbers - 1, back + numbers)
-    return vertices, Polygons(counts, corners.astype(np.int32))
+    return vertices, Polygons.of_corners(counts, corners, len(vertices))

@@ -56,7 +56,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, Polygons]:
     for name in _CORNERS:
         if name in faces:
             counts, corners = faces[name]
-            return vertices, Polygons(counts.astype(np.int32), corners.astype(np.int32))
+            return vertices, Polygons.of_corners(counts, corners, len(vertices))
     return vertices, Polygons(np.zeros(0, np.int32), np.zeros(0, np.int32))
 
 

@@ -26,6 +26,19 @@ class Polygons:
         return cls(counts, np.ascontiguousarray(triangles, dtype=np.int32).ravel())
 
     @classmethod
+    def of_corners(cls, counts: np.ndarray, corners: np.ndarray, n_vertices: int) -> Polygons:
+        """Polygons of `counts` (P,) and `corners` (N,) of any integer type, as a file has them.
+
+        Raises:
+            ValueError: a corner is none of the `n_vertices`, or a polygon has fewer than three.
+        """
+        if len(counts) and (counts.min() < 3 or counts.sum() != len(corners)):
+            raise ValueError("a face of fewer than three corners, or corners of no face")
+        if len(corners) and (corners.min() < 0 or corners.max() >= n_vertices):
+            raise ValueError(f"a face with a vertex beyond the {n_vertices} there are")
+        return cls(counts.astype(np.int32), corners.astype(np.int32))
+
+    @classmethod
     def with_quads(cls, triangles: np.ndarray) -> Polygons:
         """The `triangles` (T, 3) with the quads that they were split from: (a, b, c), (a, c, d) in a row.
 
