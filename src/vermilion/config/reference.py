@@ -12,7 +12,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from vermilion.config.root import Configuration
-from vermilion.config.takes import COLUMNS, SPLIT
+from vermilion.config.sheet_cells import COLUMNS
+from vermilion.config.takes import SPLIT
 from vermilion.storage.files import atomic_path
 
 ROLES = ("tattoo", "plain", "video", "tracked")

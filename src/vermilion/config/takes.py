@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
@@ -11,12 +10,12 @@ from pathlib import Path
 from typing import Literal, cast, get_args
 
 from vermilion.config.frame_range import frame_range
+from vermilion.config.sheet_cells import COLUMNS, OPTIONAL_COLUMNS, read_cells
 from vermilion.storage.errors import InputError
 
 Role = Literal["tattoo", "plain", "video", "tracked"]
-COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
-#: Columns that may be left out.
-OPTIONAL_COLUMNS = ("face", "focal", "of")
+#: Largest number of a frame: results are named by six digits.
+MOST_FRAME = 999_999
 #: What a split may be.
 SPLIT = r"train|test|none|test:\d+-\d+(,\d+-\d+)*"
 #: `source` of a take that the studio makes.
@@ -92,23 +91,15 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
     """Read the sheet; returns the good rows and a sentence for each problem (none raised)."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        rows, problems = read_cells(path)
     except OSError as error:
         return [], [
             f"{path}: found no readable take sheet ({error.strerror}); expected a TSV with "
             f"columns {' '.join(COLUMNS)}. Create it or correct the key `takes`."
         ]
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    rows = list(csv.DictReader(lines, delimiter="\t"))
-    header = lines[0].split("\t") if lines else []
-    missing = [name for name in COLUMNS if name not in header]
-    unknown = [name for name in header if name not in COLUMNS + OPTIONAL_COLUMNS]
-    if missing or unknown:
-        return [], [
-            f"{path}, header: found columns {header}; expected {list(COLUMNS)}, separated "
-            "by tabs. Correct the first line."
-        ]
-    takes, problems = [], []
+    if problems:
+        return [], problems
+    takes = []
     for number, row in enumerate(rows, start=1):
         take, wrong = _parse(row)
         problems += [f"{path}, row {number} ({row['subject']}/{row['take']}): {w}" for w in wrong]
@@ -118,19 +109,23 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
     return takes, problems
 
 
-def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
-    value = {name: (row.get(name) or "").strip() for name in COLUMNS + OPTIONAL_COLUMNS}
+def _parse(row: dict[str, str]) -> tuple[Take | None, list[str]]:
+    value = {name: row.get(name, "") for name in COLUMNS + OPTIONAL_COLUMNS}
     wrong = []
     for name in ("subject", "take"):
-        if not re.fullmatch(r"[A-Za-z0-9_.]+", value[name]):
+        if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.]+", value[name]):
             wrong.append(
-                f"{name}: found '{value[name]}'; expected letters, digits, '_' and '.'. "
-                "Rename it: it becomes a folder."
+                f"{name}: found '{value[name]}'; expected letters, digits, '_' and '.', which does not "
+                "come first. Rename it: it becomes a folder."
             )
     if value["role"] not in get_args(Role):
         wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
     if not value["source"]:
         wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
+    if not value["source"].isprintable():
+        wrong.append(
+            f"source: found {value['source']!r}; expected a path. Remove what cannot be seen."
+        )
     numbers: dict[str, float] = {}
     open_ends = [name for name in ("first", "last") if not value[name]]
     for name, kind in (("first", int), ("last", int), ("fps", float)):
@@ -148,11 +143,14 @@ def _parse(row: dict[str, str | None]) -> tuple[Take | None, list[str]]:
     elif open_ends and not wrong:
         numbers, reason = _with_range(value, numbers, open_ends)
         wrong += [reason] if reason else []
-    if {"first", "last"} <= numbers.keys() and not 0 <= numbers["first"] <= numbers["last"]:
+    if {"first", "last"} <= numbers.keys() and not (
+        0 <= numbers["first"] <= numbers["last"] <= MOST_FRAME
+    ):
         wrong.append(
-            f"frames: found {numbers['first']} to {numbers['last']}; expected 0 <= first <= last."
+            f"frames: found {numbers['first']} to {numbers['last']}; expected 0 <= first <= last <= "
+            f"{MOST_FRAME}."
         )
-    if numbers.get("fps", 1) <= 0:
+    if not 0 < numbers.get("fps", 1) < math.inf:
         wrong.append(f"fps: found {numbers['fps']}; expected more than 0 frames a second.")
     split = value["split"] or "none"
     wrong += _split_problems(split, numbers)

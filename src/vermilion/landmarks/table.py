@@ -11,6 +11,7 @@ import pandas as pd
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
 from vermilion.storage.errors import InputError
+from vermilion.storage.tables import read_delimited
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,7 @@ def read_landmark_csv(
     Raises:
         InputError: a column is missing, or a value is no number.
     """
-    try:
-        table = pd.read_csv(path, skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"an unreadable table ({error})", "a CSV with a header", "Check the file.", path=path
-        ) from error
+    table = read_delimited(path, ",", skipinitialspace=True)
     table.columns = [str(name).strip() for name in table.columns]
     n_points = _count_points(table, path)
     try:
@@ -62,7 +58,7 @@ def read_landmark_csv(
     confidence = _column(numbers, "confidence")
     good = (confidence >= min_confidence) & (_column(numbers, "success") > 0)
     good &= np.isfinite(points).all(axis=(1, 2))
-    frames = numbers["frame"].to_numpy(int) - first_frame
+    frames = _frames(numbers["frame"].to_numpy(float), good, path) - first_frame
     return LandmarkTable(
         {
             int(frame): Landmarks(points[row], np.full(N_LANDMARKS, confidence[row]), True)
@@ -70,6 +66,27 @@ def read_landmark_csv(
             if good[row]
         }
     )
+
+
+def _frames(numbers: np.ndarray, good: np.ndarray, path: str | Path) -> np.ndarray:
+    """Frame numbers (N,) of all rows, whole and once each among the rows that are `good` (N,)."""
+    if not np.isfinite(numbers).all() or (numbers != np.rint(numbers)).any():
+        raise InputError(
+            "a row without the number of its frame",
+            "a whole number",
+            "Correct the file.",
+            path=path,
+        )
+    frames = numbers.astype(np.int64)
+    unique, count = np.unique(frames[good], return_counts=True)
+    if (count > 1).any():
+        raise InputError(
+            f"frame {unique[count > 1][0]} in {count.max()} rows",
+            "one row a frame",
+            "Keep the rows of one face (OpenFace: of one face_id).",
+            path=path,
+        )
+    return frames
 
 
 def _count_points(table: pd.DataFrame, path: str | Path) -> int:

@@ -91,8 +91,17 @@ def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmark
             subject=subject,
             path=path,
         )
+    places = table[["x", "y", "z"]].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
+    if len(set(numbers)) < len(numbers) or not np.isfinite(places).all():
+        raise InputError(
+            "a landmark twice, or a coordinate that is no number",
+            "one row a landmark with x, y and z in the scan's units",
+            "Correct the table.",
+            subject=subject,
+            path=path,
+        )
     points = np.full((N_LANDMARKS, 3), np.nan)
-    points[numbers] = table[["x", "y", "z"]].to_numpy(dtype=np.float64)
+    points[numbers.astype(int)] = places
     return ScanLandmarks(points, np.zeros(N_LANDMARKS))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from vermilion.storage.errors import InputError
+from vermilion.storage.tables import read_delimited, shortened
 
 #: ARKit shapes without a side that models may split in two.
 SPLIT = ("browInnerUp", "cheekPuff")
@@ -42,15 +43,7 @@ def read_live_link(
     Rows from `csv_first` on are used; an expression that the file lacks stays 0. Raises InputError
     where the file is no such table or has too few rows.
     """
-    try:
-        table = pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"an unreadable table ({error})",
-            "a Live Link Face CSV",
-            "Check `studio.subjects...takes...csv`.",
-            path=path,
-        ) from error
+    table = read_delimited(path, ",")
     columns = {
         arkit_name(column): table[column] for column in table.columns if column[:1].isalpha()
     }
@@ -60,7 +53,7 @@ def read_live_link(
                 columns.setdefault(whole + suffix, columns[whole])
     if OPENING_COLUMN not in columns:
         raise InputError(
-            f"columns {list(table.columns)[:6]}...",
+            f"the columns {shortened(table.columns, 6)}",
             "ARKit weights (JawOpen, MouthPucker, ...)",
             "Export the take from Live Link Face as CSV.",
             path=path,
@@ -77,6 +70,15 @@ def read_live_link(
     index = np.arange(len(table))
     for k, name in enumerate(names):
         if name in columns:
-            values = pd.to_numeric(columns[name], errors="coerce").fillna(0.0).to_numpy()
+            values = pd.to_numeric(columns[name], errors="coerce").to_numpy(float)
+            given = columns[name].notna().to_numpy()
+            if not np.isfinite(values[given]).all():
+                raise InputError(
+                    f"a value of {name} that is no finite number",
+                    "weights from 0 to 1",
+                    "Export the take from Live Link Face again.",
+                    path=path,
+                )
+            values = np.where(given, values, 0.0)
             weights[:, k] = np.interp(rows, index, values)
     return np.clip(weights, 0.0, 1.0)
