@@ -15,7 +15,7 @@ from vermilion.imaging.images import write_srgb8 as write
 SIDE = 100_000  # pixels: 10^10 of them, 30 GB
 
 
-def picture(rng: np.random.Generator) -> np.ndarray:
+def face_image(rng: np.random.Generator) -> np.ndarray:
     """(40, 60, 3) uint8: smooth, so that JPEG keeps it, with some noise."""
     y, x = np.mgrid[:40, :60]
     smooth = np.stack([4 * x, 6 * y, 2 * (x + y)], axis=-1)
@@ -25,10 +25,10 @@ def picture(rng: np.random.Generator) -> np.ndarray:
 def whole(path: Path, rng: np.random.Generator) -> Path:
     """A good image of the format of the suffix."""
     if path.suffix == ".exr":
-        rgb = picture(rng).astype(np.float32) / 255
+        rgb = face_image(rng).astype(np.float32) / 255
         write_channels(path, {name: rgb[..., k] for k, name in enumerate("RGB")})
     else:
-        write(path, picture(rng))
+        write(path, face_image(rng))
     return path
 
 
@@ -188,9 +188,9 @@ def looks_right(suffix: str, real: str):
     """The pixels are those of the format in the file, whatever it is called."""
 
     def right(pixels):
-        expected = ((picture(np.random.default_rng(1)) / 255.0 + 0.055) / 1.055) ** 2.4
+        expected = ((face_image(np.random.default_rng(1)) / 255.0 + 0.055) / 1.055) ** 2.4
         if real == ".exr":
-            expected = picture(np.random.default_rng(1)) / 255.0
+            expected = face_image(np.random.default_rng(1)) / 255.0
         assert np.abs(pixels - expected).mean() < 0.02
 
     return Case(f"{real} named {suffix}", named(suffix, real), read_image, right=right)
