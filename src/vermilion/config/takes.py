@@ -111,21 +111,7 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
 
 def _parse(row: dict[str, str]) -> tuple[Take | None, list[str]]:
     value = {name: row.get(name, "") for name in COLUMNS + OPTIONAL_COLUMNS}
-    wrong = []
-    for name in ("subject", "take"):
-        if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.]+", value[name]):
-            wrong.append(
-                f"{name}: found '{value[name]}'; expected letters, digits, '_' and '.', which does not "
-                "come first. Rename it: it becomes a folder."
-            )
-    if value["role"] not in get_args(Role):
-        wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
-    if not value["source"]:
-        wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
-    if not value["source"].isprintable():
-        wrong.append(
-            f"source: found {value['source']!r}; expected a path. Remove what cannot be seen."
-        )
+    wrong = _word_problems(value)
     numbers: dict[str, float] = {}
     open_ends = [name for name in ("first", "last") if not value[name]]
     for name, kind in (("first", int), ("last", int), ("fps", float)):
@@ -173,6 +159,26 @@ def _parse(row: dict[str, str]) -> tuple[Take | None, list[str]]:
         value["of"],
     )
     return take, []
+
+
+def _word_problems(value: dict[str, str]) -> list[str]:
+    """What is wrong with the cells that are no numbers."""
+    wrong = []
+    for name in ("subject", "take"):
+        if not re.fullmatch(r"(?!\.)[A-Za-z0-9_.]+", value[name]):
+            wrong.append(
+                f"{name}: found '{value[name]}'; expected letters, digits, '_' and '.', which does not "
+                "come first. Rename it: it becomes a folder."
+            )
+    if value["role"] not in get_args(Role):
+        wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
+    if not value["source"]:
+        wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
+    if not value["source"].isprintable():
+        wrong.append(
+            f"source: found {value['source']!r}; expected a path. Remove what cannot be seen."
+        )
+    return wrong
 
 
 def _split_problems(split: str, numbers: dict[str, float]) -> list[str]:
