@@ -8,11 +8,11 @@ import struct
 import numpy as np
 
 from tests.faults.case import Case, check, parametrized
+from vermilion.external.read import read_tracked
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh, read_polygons, write_ply
 from vermilion.guided.inputs import read_sculpt
 from vermilion.scan.read import read_scan
-from vermilion.tracking.external.read import read_tracked
 
 
 def sheet(n: int = 12) -> Mesh:
