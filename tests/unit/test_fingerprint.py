@@ -2,7 +2,7 @@
 
 import pytest
 
-from vermilion.provenance.fingerprint import _direct_imports, _tree, _tree_text, fingerprint
+from vermilion.provenance.fingerprint import _read, fingerprint
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def project(tmp_path):
     script.write_text("def main():\n    from vermilion.deep.maths import TWO\n    print(TWO)\n")
 
     def mark():
-        for cached in (fingerprint, _tree, _tree_text, _direct_imports):
+        for cached in (fingerprint, _read):
             cached.cache_clear()
         return fingerprint(script, source)
 

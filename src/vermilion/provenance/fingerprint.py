@@ -7,9 +7,13 @@ of the package that it imports directly or through others, does.
 from __future__ import annotations
 
 import ast
+import gc
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 PACKAGE = "vermilion"
 SOURCE = Path(__file__).resolve().parents[1]
@@ -24,9 +28,9 @@ def fingerprint(script: Path, source: Path = SOURCE) -> str:
         source: folder of the package `vermilion`.
     """
     closure = sorted(imported_files(script, source))
-    digest = hashlib.sha256(_tree_text(script).encode())
+    digest = hashlib.sha256(_read(script, source).text.encode())
     for path in closure:
-        digest.update(f"\n{path.relative_to(source)}\n{_tree_text(path)}".encode())
+        digest.update(f"\n{path.relative_to(source)}\n{_read(path, source).text}".encode())
     return digest.hexdigest()[:16]
 
 
@@ -35,43 +39,65 @@ def imported_files(script: Path, source: Path = SOURCE) -> set[Path]:
     found: set[Path] = set()
     pending = [script]
     while pending:
-        for path in _direct_imports(pending.pop(), source):
+        for path in _read(pending.pop(), source).imports:
             if path not in found:
                 found.add(path)
                 pending.append(path)
     return found
 
 
-@cache
-def _tree(path: Path) -> ast.Module:
-    """The syntax tree without docstrings."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
-    for node in ast.walk(tree):
-        if (
-            isinstance(node, ast.Module | ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-            and ast.get_docstring(node, clean=False) is not None
-        ):
-            node.body = node.body[1:] or [ast.Pass()]
-    return tree
+class _Code(NamedTuple):
+    """What counts of a file: its syntax tree without docstrings as text, and what it imports."""
+
+    text: str
+    imports: tuple[Path, ...]
 
 
 @cache
-def _tree_text(path: Path) -> str:
-    return ast.dump(_tree(path))
-
-
-@cache
-def _direct_imports(path: Path, source: Path) -> tuple[Path, ...]:
-    names: set[str] = set()
-    for node in ast.walk(_tree(path)):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = _absolute(node, path, source)
-            names.add(base)
-            names.update(f"{base}.{alias.name}" for alias in node.names)
+def _read(path: Path, source: Path) -> _Code:
+    with _without_collection():
+        tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+        statements = list(_statements(tree))
+        names: set[str] = set()
+        for node in statements:
+            if isinstance(node, ast.Import):
+                names.update(alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                base = _absolute(node, path, source)
+                names.add(base)
+                names.update(f"{base}.{alias.name}" for alias in node.names)
+            elif (
+                isinstance(node, _WITH_DOCSTRING)
+                and ast.get_docstring(node, clean=False) is not None
+            ):
+                node.body = node.body[1:] or [ast.Pass()]
+        text = ast.dump(tree)
     files = {file for name in names for file in _files_of(name, source)}
-    return tuple(sorted(files))
+    return _Code(text, tuple(sorted(files)))
+
+
+_WITH_DOCSTRING = ast.Module | ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """The node and all statements below it: no import and no docstring stands in an expression."""
+    yield node
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        below = getattr(node, part, ())
+        for child in below if isinstance(below, list) else ():
+            yield from _statements(child)
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """No garbage collection: a syntax tree is many objects and no garbage, and would be gone through again and again."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def _absolute(node: ast.ImportFrom, path: Path, source: Path) -> str:
