@@ -62,11 +62,14 @@ report: $(READY)
 verify: $(READY)
 	@$(VERMILION) verify "$(CONFIG)"
 
+# Compiled test files are kept, also where the environment says not to: half of a process's start.
+PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+
 test: test-quick
-	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m slow
+	$(PYTEST) -m slow
 
 test-quick: setup
-	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder -m "not slow"
+	$(PYTEST) -m "not slow"
 
 # Not in `make test`: Blender (374 MB), the validators of USD and glTF. What cannot be made is skipped.
 test-interchange: $(READY) $(VENV)-interchange.ready

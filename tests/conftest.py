@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from pathlib import Path
 
@@ -11,14 +12,33 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import pytest  # noqa: E402
 
+# A process of tests holds many modules and items that never go: less often looked through for garbage.
+gc.set_threshold(50_000)
+
 ROOT = Path(__file__).resolve().parents[1]
-#: The file that takes longest begins; those that wait for what it makes come last.
-_BEGIN, _END = ("test_faults",), ("test_reruns", "test_chunks")
+#: The file that makes the tiny run begins. Files that wait for that run come last, the longest of them first.
+_BEGIN = "test_faults"
+_END = ("test_chunks", "test_failed_takes", "test_guided", "test_reruns")
 
 
 def pytest_collection_modifyitems(items):
     """Order the files for processes that each take one at a time (`-n 2 --dist loadfile`)."""
-    items.sort(key=lambda item: (item.path.stem not in _BEGIN) + (item.path.stem in _END))
+
+    def place(item):
+        name = item.path.stem
+        if name == _BEGIN or item.path.parent.name != "workflow":
+            return -1 if name == _BEGIN else 0
+        return 1 + _END.index(name) if name in _END else 0
+
+    items.sort(key=place)
+
+
+def pytest_collection_finish():
+    gc.freeze()
+
+
+def pytest_sessionfinish():
+    gc.unfreeze()
 
 
 @pytest.fixture(scope="session")

@@ -99,27 +99,32 @@ def paint(root, out, frames, meshes=None, source="rom"):
     return out / chunk
 
 
-def test_frames_come_out_without_their_tattoo(capture, tmp_path):
-    folder = paint(capture, tmp_path, [0, 1, 2])
+@pytest.fixture(scope="module")
+def painted(capture, tmp_path_factory):
+    """The whole take in one chunk."""
+    return paint(capture, tmp_path_factory.mktemp("painted"), [0, 1, 2])
+
+
+def test_frames_come_out_without_their_tattoo(capture, painted):
     model, camera = lip_patch.face_model(), lip_patch.cameras()["front"]
     for frame, pose in enumerate(POSES):
         truth = lip_patch.render(model, lip_patch.vertices_at(*pose), camera, tattoo=False)
         inked = read_image(capture / f"rom/frames/front/{frame:06d}.png")
-        ours = read_image(folder / f"{frame:06d}.png")
+        ours = read_image(painted / f"{frame:06d}.png")
         before = np.abs(to_display(inked).astype(int) - to_display(truth)).mean()
         after = np.abs(to_display(ours).astype(int) - to_display(truth)).mean()
         assert after < 0.1 * before  # levels of 8 bit
-    rows = read_table(tmp_path / "quality/000000-000002.tsv")
+    rows = read_table(painted.parent / "quality/000000-000002.tsv")
     assert rows["valid"].all() and (rows["composited_px"] > 1000).all()
     assert (rows["border_levels8"] < 2.0).all()
 
 
-def test_chunks_change_no_bit(capture, tmp_path):
-    whole = paint(capture, tmp_path / "whole", [0, 1, 2])
-    parts = [paint(capture, tmp_path / "parts", frames) for frames in ([0], [1, 2])]
-    for part in parts:
-        for path in part.iterdir():
-            assert path.read_bytes() == (whole / path.name).read_bytes()
+def test_chunks_change_no_bit(capture, painted, tmp_path):
+    parts = [paint(capture, tmp_path, frames) for frames in ([0], [1, 2])]
+    made = [path for part in parts for path in part.iterdir()]
+    assert len(made) == len(POSES)
+    for path in made:
+        assert path.read_bytes() == (painted / path.name).read_bytes()
 
 
 def test_a_frame_is_read_once_and_its_mesh_is_one_ray_caster(capture, tmp_path, monkeypatch):

@@ -16,6 +16,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("Snakefile", "config", "profiles", "workflow", "src")
+#: What numba and Python write beside their compiled files, and rename.
+BEING_WRITTEN = shutil.ignore_patterns("*.tmp.*", "*.pyc.*")
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Project:
         return {
             **os.environ,
             "PYTHONPATH": str(self.folder / "src"),
-            "PYTHONDONTWRITEBYTECODE": "1",
+            "PYTHONDONTWRITEBYTECODE": "",
         }
 
     def snakemake(self, *arguments: str, check: bool = True) -> subprocess.CompletedProcess:
@@ -76,11 +78,11 @@ class Project:
 
 
 def copy_project(folder: Path) -> Project:
-    """Copy what a run needs, without results."""
+    """Copy what a run needs, without results; with what is compiled already, so that no job does it again."""
     for name in COPIED:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / name, ignore=BEING_WRITTEN)
         else:
             shutil.copy(source, folder / name)
     return Project(folder)

@@ -25,15 +25,27 @@ def jobs_of(printed: str) -> list[tuple[str, str, str]]:
     return jobs
 
 
-@pytest.mark.slow
-def test_only_the_evaluation_reads_truth(fresh_project):
+@pytest.fixture(scope="module")
+def planned(fresh_project):
+    """(rule, inputs, outputs) of every job of the tiny capture."""
     run = fresh_project.snakemake("--dry-run")
     jobs = jobs_of(run.stdout + run.stderr)
     assert len(jobs) > 50
-    readers = {rule for rule, inputs, _ in jobs if "/truth/" in inputs}
-    writers = {rule for rule, _, outputs in jobs if "/truth/" in outputs}
+    return jobs
+
+
+@pytest.mark.slow
+def test_only_the_evaluation_reads_truth(planned):
+    readers = {rule for rule, inputs, _ in planned if "/truth/" in inputs}
+    writers = {rule for rule, _, outputs in planned if "/truth/" in outputs}
     assert readers == MEASURING
     assert writers and all(rule.startswith("studio_rig_") for rule in writers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", ["scan", "guided"])
+def test_without_scans_or_takes_to_be_corrected_there_is_no_such_job(planned, rule):
+    assert not [name for name, _, _ in planned if name.startswith(rule)]
 
 
 @pytest.mark.slow
@@ -50,14 +62,13 @@ def test_only_the_evaluation_reads_external_truth(fresh_project, data_root):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("detector", "follow"), [({}, True), ({"kind": "boosted"}, False)])
-def test_contours_wait_for_the_track_unless_labels_count_as_drawn(fresh_project, detector, follow):
-    contours = json.dumps({"detector": detector})
+def test_contours_wait_for_the_track_unless_labels_count_as_drawn(fresh_project, planned):
+    contours = json.dumps({"detector": {"kind": "boosted"}})
     run = fresh_project.snakemake("--dry-run", "--config", f"contours={contours}")
-    jobs = jobs_of(run.stdout + run.stderr)
-    for rule in ("contour_detector", "contours"):
-        inputs = [inputs for name, inputs, _ in jobs if name == rule]
-        assert inputs and all(("/tracking/C/" in found) == follow for found in inputs)
+    for jobs, follow in ((planned, True), (jobs_of(run.stdout + run.stderr), False)):
+        for rule in ("contour_detector", "contours"):
+            inputs = [inputs for name, inputs, _ in jobs if name == rule]
+            assert inputs and all(("/tracking/C/" in found) == follow for found in inputs)
 
 
 def test_a_change_of_the_evaluation_reruns_nothing_that_comes_before_it():

@@ -66,10 +66,6 @@ def jobs_of_the_target(project):
     return {rule: count for rule, count in jobs.items() if rule != "guided"}
 
 
-def test_nothing_is_corrected_unless_a_take_is_named(fresh_project):
-    assert not [rule for rule in fresh_project.would_run() if rule.startswith("guided")]
-
-
 def test_takes_that_cannot_be_corrected_or_studied_are_refused(fresh_project):
     takes = {"s1/plain": "base", "s1/phone": "H"}
     guided = json.dumps({"takes": takes, "study": {"takes": ["s1/nobody"]}})

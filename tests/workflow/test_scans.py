@@ -33,12 +33,6 @@ def test_a_scan_changes_the_model_of_its_subject_alone(fresh_project):
     assert basis and all("face_model/tracker.npz" in given for given in basis)
 
 
-@pytest.mark.slow
-def test_without_scans_there_is_no_such_job(fresh_project):
-    run = fresh_project.snakemake("--dry-run")
-    assert "scan" not in {rule for rule, _, _ in jobs_of(run.stdout + run.stderr)}
-
-
 def test_scans_of_nobody_and_without_landmarks_are_refused(tmp_path):
     sheet = tmp_path / "takes.tsv"
     sheet.write_text(
