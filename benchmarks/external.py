@@ -28,6 +28,7 @@ from vermilion.config.takes import Take, read_takes
 from vermilion.export.weights import write_weights
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
+from vermilion.storage.tables import read_table
 
 #: Folders of a take that do not depend on the base.
 SHARED = ("capture", "cameras", "landmarks", "multiview", "inpaint")
@@ -153,7 +154,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def figures(path: Path) -> pd.DataFrame:
     """Motion error of the lips over all takes, and its ratios to the base and to `null`, by regressor."""
-    table = pd.read_csv(path, sep="\t")
+    table = read_table(path)
     chosen = table[(table["measure"] == "lip_motion_error_mm") & (table["region"] == "vermilion")]
     chosen = chosen[(chosen["subject"] == "all") & (chosen["take"] == "all")]
     motion = chosen.set_index("regressor")["value"]

@@ -6,16 +6,20 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+from pxr import Usd, UsdGeom
 from scipy.spatial.transform import Rotation
 
 from tests.stages.run_script import run_script
 from vermilion.appearance.estimate import Appearance
 from vermilion.config.apply import ExportConfig
 from vermilion.export.objs import write_obj
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.external.read import read_tracked
 from vermilion.faces import procedural
 from vermilion.geometry.camera import Camera, look_at
 from vermilion.geometry.mesh_files import read_polygons
+from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
 from vermilion.storage.quality import QualityRow, write_quality
@@ -81,7 +85,7 @@ def take(tmp_path_factory):
     return root, studio, tracker, corrected
 
 
-def export(root, out, options):
+def export(root, out, options, **more):
     names = {
         "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
         "overlay": "overlay.mp4", "timeline": "timeline.png", "full": "full.npy",
@@ -102,6 +106,7 @@ def export(root, out, options):
             "corrected": [root / f"{chunk}.npy" for chunk in CHUNKS],
             "overlays": [root / f"{chunk}.mp4" for chunk in CHUNKS],
             "quality": [root / f"{chunk}.tsv" for chunk in CHUNKS],
+            **more,
         },
         output={name: out / file for name, file in names.items()},
     )  # fmt: skip
@@ -128,6 +133,35 @@ def test_every_format_of_the_trackers_mesh_is_the_corrected_take(take, tmp_path)
     texture = cv2.imread(str(tmp_path / "albedo.png"))
     assert texture.shape == (1024, 1024, 3)
     assert np.ptp(texture.reshape(-1, 3), axis=0).max() <= 1  # one albedo everywhere
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_another_trackers_sequence_goes_back_to_its_own_world_unit_and_polygons(
+    take, tmp_path, turned
+):
+    root, _, tracker, corrected = take
+    turn = Rotation.from_euler("xyz", [180, 20, 5], degrees=True).as_matrix()
+    placement = Placement(turn, np.array([40.0, -30, 250]), 0.0, False)
+    polygons = Polygons.with_quads(tracker.triangles)
+    origin = Origin(1000.0, "z" if turned else "y", turned, polygons, 500)
+    placement.save(tmp_path / "placement.npz")
+    origin.save(tmp_path / "origin.npz")
+    own = {name: tmp_path / f"{name}.npz" for name in ("placement", "origin")}
+    export(root, tmp_path, ExportConfig(formats=list(FILES)), **own)
+    wanted = origin.in_file(placement.undo(corrected))  # metres
+    for name, file in FILES.items():
+        limit = 2.1e-5 if name in ("usd_shapes", "gltf") else 1e-6
+        back = read_tracked(tmp_path / file, FRAMES, 1000.0)
+        off = np.linalg.norm(back.vertices_mm / 1000.0 - wanted, axis=2)
+        assert off.max() < limit, file
+        if name != "gltf":  # which has triangles alone
+            assert np.array_equal(back.polygons.counts, polygons.counts), file
+            assert np.array_equal(back.polygons.corners, polygons.corners), file
+    stage = Usd.Stage.Open(str(tmp_path / FILES["usd"]))
+    assert UsdGeom.GetStageUpAxis(stage) == ("Z" if turned else "Y")
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    # The world of the capture is that of corrected.npy, as for every base.
+    assert np.array_equal(np.load(tmp_path / "corrected.npy"), corrected)
 
 
 def test_the_full_face_has_the_corrected_lips_and_its_own_topology(take, tmp_path):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.stages.run_script import run_script
 from tests.unit import guided_mouths as mouths
@@ -11,9 +12,13 @@ from tests.unit.procedural_mouth import mouth
 from vermilion.config.apply import OverlayConfig
 from vermilion.config.guided import GuidedConfig
 from vermilion.correction.lip_crossings import LipCrossings
+from vermilion.export.objs import write_obj
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.geometry.camera import write_cameras
 from vermilion.geometry.mesh import Mesh, adjacency
 from vermilion.geometry.mesh_files import write_ply
+from vermilion.geometry.polygons import Polygons
 from vermilion.guided.inputs import read_views
 from vermilion.guided.refined_frame import RefinedFrame
 from vermilion.guided.refinement import RefinementSettings, View
@@ -97,7 +102,7 @@ def sketch_file(root, frame):
     return root / "labels" / "sketches" / "cam" / f"{frame:06d}.json"
 
 
-def refine(root, frame, kind="sketch", corrections=None):
+def refine(root, frame, kind="sketch", corrections=None, **more):
     sculpt = root / "labels" / "sculpts" / f"{frame:06d}.ply"
     given = corrections or [sketch_file(root, frame) if kind == "sketch" else sculpt]
     run_script(
@@ -109,7 +114,7 @@ def refine(root, frame, kind="sketch", corrections=None):
         },
         input={
             "corrections": given, "face": root / "tracker.npz", "fit": root / "fit.npz",
-            "sequence": root / "C" / "000000-000005.npy", "cameras": root / "cameras",
+            "sequence": root / "C" / "000000-000005.npy", "cameras": root / "cameras", **more,
         },
         output={
             "refined": root / f"refined/{frame:06d}.npz", "quality": root / f"{frame:06d}.tsv",
@@ -221,6 +226,29 @@ def test_a_sculpted_frame_is_learnt_as_it_is(take, meshes):
     assert np.linalg.norm(sculpt - base[SCULPTED], axis=1)[free].max() > 0.5
     assert np.abs(found[SCULPTED] - sculpt)[free].max() < 0.02
     assert (np.linalg.norm(found - base, axis=2)[1:, free].max(axis=1) > 0.3).all()
+
+
+@pytest.mark.parametrize(("suffix", "turned"), [("obj", True), ("ply", False)])
+def test_a_sculpt_of_another_trackers_sequence_is_in_its_own_world_and_unit(
+    take, meshes, tmp_path, suffix, turned
+):
+    sculpt = sculpted(meshes[1][SCULPTED])
+    turn = Rotation.from_euler("xyz", [170, 20, 5], degrees=True).as_matrix()
+    placement = Placement(turn, np.array([40.0, -30, 250]), 0.0, False)
+    polygons = Polygons.of_triangles(FACE().triangles)
+    origin = Origin(1000.0, "z" if turned else "y", turned, polygons, 0)
+    placement.save(tmp_path / "placement.npz")
+    origin.save(tmp_path / "origin.npz")
+    given = tmp_path / f"{SCULPTED:06d}.{suffix}"
+    in_file = origin.in_file(placement.undo(sculpt))
+    if suffix == "ply":
+        write_ply(given, Mesh(in_file, FACE().triangles))
+    else:
+        write_obj(given, in_file, polygons)
+    own = {name: tmp_path / f"{name}.npz" for name in ("placement", "origin")}
+    refine(take, SCULPTED, "sculpt", [given], **own)
+    found = RefinedFrame.load(take / f"refined/{SCULPTED:06d}.npz").vertices_mm
+    assert np.abs(found - sculpt).max() < 1e-3  # mm
 
 
 def test_a_frame_without_a_mesh_is_left_and_named(take, meshes):

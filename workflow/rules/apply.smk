@@ -74,10 +74,7 @@ def exported_files(folder):
 
 def exports_need(wildcards):
     """What the exported files need beyond the corrected chunks (use with `unpack`)."""
-    needed = {"identity": P.identity.format(subject=wildcards.subject)}
-    if EXTERNAL:
-        needed["placement"] = P.placement.format(**wildcards)
-        needed["sequence"] = fill(P.sequence, sequence_of(wildcards))
+    needed = {"identity": P.identity.format(subject=wildcards.subject), **own_frame(wildcards)}
     options = CONFIG.apply.export
     if options.topology == "full" or options.live_link:
         needed["studio"] = P.studio_model

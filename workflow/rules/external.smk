@@ -28,6 +28,16 @@ def chunk_of_sequence(pattern):
     return lambda wildcards: fill(pattern, sequence_of(wildcards), chunk=wildcards.chunk)
 
 
+def own_frame(wildcards):
+    """What takes a take's results back to its base's own world, unit and polygons (use with `unpack`)."""
+    if not EXTERNAL:
+        return {}
+    return {
+        "placement": fill(P.placement, wildcards),
+        "origin": fill(P.sequence, sequence_of(wildcards)),
+    }
+
+
 def neutral_take(subject):
     """The take whose neutral is the subject's: its first with an accurate mesh, else its first video."""
     return (takes("tattoo", subject) or takes("video", subject))[0]

@@ -85,6 +85,19 @@ def guided_neutral(wildcards):
     return {"identity": P.identity.format(subject=wildcards.subject)}
 
 
+def guided_frame(wildcards):
+    """What takes the sequence back to another tracker's own world; nothing for H (use with `unpack`)."""
+    return {} if sequence_name(wildcards) == "H" else own_frame(wildcards)
+
+
+def guided_exports_need(wildcards):
+    """What the exported files need beyond the corrected chunks (use with `unpack`)."""
+    needed = exports_need(wildcards)
+    return {k: v for k, v in needed.items() if k not in own_frame(wildcards)} | guided_frame(
+        wildcards
+    )
+
+
 rule guided_suggest:
     """The frames that are worth correcting next: guided/suggestions.tsv (Guided18 7)."""
     input:
@@ -112,6 +125,7 @@ rule guided_suggest:
 rule guided_refine:
     """Moves one frame onto its sketches: guided/refined/{frame}.npz (Guided18 5, eq. 1)."""
     input:
+        unpack(guided_frame),
         corrections=lambda wildcards: person_corrections(wildcards)[wildcards.frame],
         images=lambda wildcards: fill(P.manifest, wildcards, chunk=chunk_of(wildcards)),
         face=guided_face,
@@ -205,7 +219,7 @@ rule guided_correct:
 rule guided_export:
     """Joins the chunks of a take into the files that `apply` exports, in guided/."""
     input:
-        unpack(exports_need),
+        unpack(guided_exports_need),
         tracker=guided_face,
         fit=P.fit,
         corrected=per_chunk(P.guided_chunk),

@@ -34,6 +34,10 @@ class Origin:
         points = np.asarray(vertices_mm, dtype=np.float64)
         return points @ self.axes.T / self.unit_mm
 
+    def upright(self, points_mm: np.ndarray) -> np.ndarray:
+        """The `points_mm` (..., 3) in the file's axes, as the sequence was read: y up where it was turned."""
+        return np.asarray(points_mm, dtype=np.float64) @ self.axes
+
     @property
     def axes(self) -> np.ndarray:
         """(3, 3) turn from the sequence's axes to the file's."""

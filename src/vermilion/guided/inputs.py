@@ -65,18 +65,21 @@ def read_views(
     return views
 
 
-def read_sculpt(path: str | Path, triangles: np.ndarray, n_vertices: int) -> np.ndarray:
+def read_sculpt(
+    path: str | Path, triangles: np.ndarray, n_vertices: int, unit_mm: float = 1.0
+) -> np.ndarray:
     """A sculpted mesh of the sequence's topology, (V, 3) mm.
 
     Args:
         path: OBJ, PLY or USD; an animated USD is read at the frame that the file is named after.
         triangles: (T, 3) of the sequence.
         n_vertices: V.
+        unit_mm: length of the unit of OBJ and PLY; USD names its own.
 
     Raises:
         InputError: another topology, or numbers that are not finite.
     """
-    mesh = _read_sculpted(Path(path))
+    mesh = _read_sculpted(Path(path), unit_mm)
     same = mesh.triangles.shape == triangles.shape and (mesh.triangles == triangles).all()
     if len(mesh.vertices_mm) != n_vertices or not same:
         raise InputError(
@@ -93,8 +96,9 @@ def read_sculpt(path: str | Path, triangles: np.ndarray, n_vertices: int) -> np.
     return mesh.vertices_mm
 
 
-def _read_sculpted(path: Path) -> Mesh:
+def _read_sculpted(path: Path, unit_mm: float) -> Mesh:
     if path.suffix.lower() not in USD_SUFFIXES:
-        return read_mesh(path)
+        mesh = read_mesh(path)
+        return mesh.with_vertices(mesh.vertices_mm * unit_mm)
     found = read_tracked(path, [int(path.stem) if path.stem.isdigit() else 0])
     return Mesh(found.vertices_mm[0].astype(np.float64), found.triangles)

@@ -165,7 +165,7 @@ def main(snakemake):
 
     if inputs.get("placement"):
         animation = coarse = in_own_frame(
-            animation, Placement.load(inputs.placement), Origin.load(inputs.sequence)
+            animation, Placement.load(inputs.placement), Origin.load(inputs.origin)
         )
     write_packages({name: out[name] for name in options.formats}, animation, basis)
 

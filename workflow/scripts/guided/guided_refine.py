@@ -6,6 +6,8 @@ import numpy as np
 
 from vermilion.config.guided import RegionsConfig, SketchRefinementConfig
 from vermilion.correction.lip_crossings import LipCrossings
+from vermilion.external.origin import Origin
+from vermilion.external.placement import Placement
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.guided.inputs import read_sculpt, read_views, sketch_cameras
@@ -32,6 +34,18 @@ def cameras_of(snakemake):
     tracked = TrackedTake.load(snakemake.input.fit).camera
     cameras = read_cameras(snakemake.input.cameras)
     return sketch_cameras(cameras, tracked, snakemake.params.tracked), tracked
+
+
+def sculpt_of(inputs, face, path):
+    """The sculpted mesh (V, 3) mm in the world of the sequence.
+
+    That of another tracker's sequence is in its own unit, axes and world, as it was exported.
+    """
+    if not inputs.get("placement"):
+        return read_sculpt(path, face.triangles, face.n_vertices)
+    origin, placement = Origin.load(inputs.origin), Placement.load(inputs.placement)
+    found = read_sculpt(path, face.triangles, face.n_vertices, origin.unit_mm)
+    return placement.apply(origin.upright(found))
 
 
 def quality_row(frame, refined):
@@ -69,7 +83,7 @@ def main(snakemake):
     base = read_frames([snakemake.input.sequence], [frame])[0].astype(np.float64)
     files = [Path(path) for path in snakemake.input.corrections]
     if snakemake.params.kind == "sculpt":
-        corrected, views = read_sculpt(files[0], face.triangles, face.n_vertices), []
+        corrected, views = sculpt_of(snakemake.input, face, files[0]), []
         row = QualityRow(frame)
     else:
         settings = SketchRefinementConfig(**cfg["guided.refinement"]).model_dump()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vermilion.config.external_base import sequences_of
 from vermilion.config.guided import GuidedConfig
 from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.root import Configuration
@@ -82,6 +83,8 @@ class TakeFiles:
 
         own_tracker = take.subject in config.tracking.scans
         tracker = patterns.own_tracker if own_tracker else patterns.tracker
+        if sequences_of(takes):
+            tracker = config.tracking.external.base.model or patterns.external_model
         of_sequence = {
             "base": patterns.coarse, "corrected": patterns.corrected, "H": patterns.accurate,
         }  # fmt: skip
