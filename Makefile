@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run cameras sketch doctor report verify test test-quick test-interchange lint format docs reference clean
+.PHONY: help setup demo lips run cameras sketch doctor report verify test test-quick test-latest test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -19,6 +19,7 @@ help:
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
+	@echo "make test-latest the quick tests with the newest versions of all packages"
 	@echo "make test-slurm  the tiny capture on a real Slurm of two nodes (as root)"
 	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
@@ -71,6 +72,11 @@ test: test-quick
 test-quick: setup
 	$(PYTEST) -m "not slow"
 
+# What the newest versions of all packages break is found here before users find it.
+test-latest:
+	tools/setup.sh $(VENV)-latest $(PYTHON) latest
+	$(VENV)-latest/bin/python -m pytest -n logical --maxprocesses 8 --dist loadfile -m "not slow"
+
 # Not in `make test`: Blender (374 MB), the validators of USD and glTF. What cannot be made is skipped.
 test-interchange: $(READY) $(VENV)-interchange.ready
 	VERMILION_INTERCHANGE=$(VENV)-interchange $(BIN)/python -m pytest -p no:cacheprovider tests/interchange
@@ -109,5 +115,5 @@ $(DOCS)/.ready: requirements.docs.lock
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV)-mediapipe* $(VENV)-interchange* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	rm -rf $(VENV) $(VENV)-latest $(VENV)-mediapipe* $(VENV)-interchange* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

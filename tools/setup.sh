@@ -1,9 +1,13 @@
 #!/bin/sh
-# Make the virtual environment $1 with the locked versions; $2 is the Python to use.
+# Make the virtual environment $1; $2 is the Python to use. Versions are those of the lock file; with
+# `latest` as $3, the newest that pyproject.toml allows.
+# uv installs where it is at hand, else pip; both read their own settings (proxy, index, a folder of
+# wheels: PIP_NO_INDEX=1 PIP_FIND_LINKS=folder, or UV_NO_INDEX=1 UV_FIND_LINKS=folder).
 # On Debian and Ubuntu, system packages that are missing are installed (as root or through sudo).
 set -eu
 venv=$1
 python=${2:-python3}
+versions=${3:-locked}
 
 install_packages() {
     command -v apt-get >/dev/null || { echo "Please install: $*" >&2; exit 1; }
@@ -25,12 +29,24 @@ command -v "$python" >/dev/null || install_packages python3 python3-venv
 "$python" -c 'import ensurepip, venv' 2>/dev/null ||
     install_packages "python$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')-venv"
 
+install() {
+    if command -v uv >/dev/null; then
+        uv pip install --python "$venv/bin/python" --quiet "$@"
+    else
+        "$venv/bin/python" -m pip install --quiet --use-pep517 --disable-pip-version-check --no-input "$@"
+    fi
+}
+
+echo "setup: environment $venv with $("$python" --version)"
 "$python" -m venv "$venv"
-quiet="--quiet --use-pep517 --disable-pip-version-check --no-input"
-# shellcheck disable=SC2086
-"$venv/bin/python" -m pip install $quiet --require-hashes -r requirements.lock
-# shellcheck disable=SC2086
-"$venv/bin/python" -m pip install $quiet --no-deps -e .
+if [ "$versions" = latest ]; then
+    echo "setup: the newest versions of all packages (a minute or two)"
+    install -e '.[dev]'
+else
+    echo "setup: $(grep -c '^[a-z0-9].*==' requirements.lock) packages of requirements.lock (a minute or two)"
+    install --require-hashes -r requirements.lock
+    install --no-deps -e .
+fi
 
 # MeshLab's library needs OpenGL's shared objects, which servers often lack.
 "$venv/bin/python" -c 'import pymeshlab' 2>/dev/null || {

@@ -27,6 +27,7 @@ done
 [ -n "$python" ] || unavailable \
     "mediapipe 0.10.21 needs Python 3.9 to 3.12 with the module venv, and $wanted is $("$wanted" --version 2>&1). Install one of these and run tools/setup_landmarks.sh again."
 
+echo "setup: the landmark network in $venv (half a minute)"
 rm -rf "$venv" "$venv.unavailable"
 "$python" -m venv "$venv" || unavailable "'$python -m venv $venv' failed."
 # --no-deps: mediapipe declares jax and others, which its face mesh does not import.

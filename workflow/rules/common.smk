@@ -42,8 +42,6 @@ except ConfigurationError as error:
 SKIPPED = [take for take in TAKES if take.name in CONFIG.skip_takes]
 CONFIG, TAKES = without_skipped(CONFIG, TAKES)
 
-SCRIPTS = Path(workflow.basedir) / "workflow" / "scripts"
-
 
 include: "paths.smk"
 include: "resources.smk"
@@ -92,7 +90,9 @@ def in_report(path, category, caption, subcategory=None, **labels):
 
 def code_of(script):
     """Fingerprint of `workflow/scripts/<script>.py` and of all that it imports from the library."""
-    return lambda wildcards: fingerprint(SCRIPTS / f"{script}.py")
+    # Beside this file, also where another workflow takes this one in as a module.
+    path = Path(workflow.source_path(f"../scripts/{script}.py"))
+    return lambda wildcards: fingerprint(path)
 
 
 def takes(role=None, subject=None):
