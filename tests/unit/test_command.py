@@ -9,6 +9,7 @@ import pytest
 from vermilion.app import doctor, main
 from vermilion.app.commands import lips
 from vermilion.app.place import from_here
+from vermilion.app.snakemake_command import python
 from vermilion.app.subcommands import parser_of
 
 
@@ -68,3 +69,20 @@ def test_doctor_says_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setenv("VERMILION_ICT_FACEKIT", str(tmp_path / "none"))
     assert doctor.face_files().state == "missing"
     assert doctor.disk(Path("/")).state in ("good", "missing")
+
+
+def test_a_folder_with_a_blank_in_its_name_does_not_stop_the_workflow(tmp_path):
+    project = tmp_path / "Größe x"
+    project.mkdir()
+    (project / "env").symlink_to(sys.prefix)
+    named = python(str(project / "env" / "bin" / "python"))
+    try:
+        assert " " not in named
+        said = subprocess.run(
+            ["sh", "-c", f"{named} -c 'import numpy, sys; print(sys.executable)'"],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert said.stdout.strip() == named
+    finally:
+        Path(named).parents[1].unlink()
+    assert python("/plain/bin/python") == "/plain/bin/python"

@@ -7,7 +7,7 @@ import pytest
 
 from .conftest import ROOT, Project
 
-OTHER_WORKFLOW = '''
+OTHER_WORKFLOW = """
 configfile: "config/tiny.yaml"
 
 module vermilion:
@@ -17,7 +17,7 @@ module vermilion:
         config
 
 use rule * from vermilion
-'''
+"""
 
 
 class Deployed(Project):

@@ -32,6 +32,12 @@ from vermilion.provenance import checksums
 from vermilion.provenance.cache import roles_of, wildcards_of
 from vermilion.provenance.fingerprint import fingerprint
 
+if any(letter.isspace() for letter in sys.executable):
+    raise WorkflowError(
+        f"Snakemake cannot start jobs with {sys.executable}: the path has a blank. "
+        "Start the workflow by `make run` or `vermilion run`, which go around it."
+    )
+
 IS_MAIN_PROCESS = workflow.exec_mode == ExecMode.DEFAULT
 ORIGIN = ", ".join(str(path) for path in workflow.configfiles)
 

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from vermilion.app.results import summary
+from vermilion.app.snakemake_command import snakemake_command
 from vermilion.app.workflow import run_workflow
 from vermilion.config.load import read_keys
 from vermilion.config.root import Configuration
@@ -49,7 +50,7 @@ def clear_failures(results: Path) -> None:
 
 def command(configuration: str, skipped: dict[str, str], options: list[str]) -> list[str]:
     """Snakemake without some takes."""
-    words = [sys.executable, "-m", "snakemake", "--configfile", configuration, *options]
+    words = snakemake_command(configuration, options)
     return [*words, "--config", f"skip_takes={json.dumps(skipped)}"] if skipped else words
 
 

@@ -6,7 +6,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from vermilion.app.sketch.refusal import RefusedRequest
+from vermilion.app.snakemake_command import snakemake_command
 from vermilion.storage.errors import VermilionError
 
 _STEPS = re.compile(r"^(\d+) of (\d+) steps \(\d+%\) done")
@@ -34,9 +34,7 @@ class PropagationRun:
 
     def __init__(self, configuration: str, targets: list[str], options: list[str]):
         """`options` of Snakemake, such as the number of cores."""
-        self._words = [
-            sys.executable, "-m", "snakemake", "--configfile", configuration, *options,
-        ]  # fmt: skip
+        self._words = snakemake_command(configuration, options)
         self._targets = targets
         self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
