@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from tests import lip_patch
 from tests.unit.evaluation_face import mouth_triangles, sheet_face
@@ -16,6 +17,7 @@ from vermilion.evaluation.take import evaluate_reconstruction, evaluate_take
 from vermilion.evaluation.visible import cameras_that_see
 from vermilion.faces.lips import lip_sides
 from vermilion.geometry.camera import look_at, pinhole
+from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import vertex_areas
 
 FRAMES = np.arange(10, 16)
@@ -257,3 +259,30 @@ def test_joined_takes_weigh_by_their_area_and_frames():
     both = ClipSums.joined([a, b])
     assert set(both.sums) == {"mouth.error", "mouth.weight"}
     assert both.sums["mouth.error"].sum() / both.sums["mouth.weight"].sum() == 1.25
+
+
+def test_the_gap_of_the_truth_is_that_of_its_own_surface(face):
+    """Between the vertices of a coarse mesh the true lips reach further into the gap."""
+    model, regions = face
+    truth = moving(model)
+    corners = truth.transpose(1, 0, 2).reshape(model.n_vertices, -1)
+    # Every triangle in four: the first vertices are the coarse ones.
+    fine, triangles = trimesh.remesh.subdivide(corners, model.triangles)
+    fine = fine.reshape(len(fine), len(FRAMES), 3).transpose(1, 0, 2)
+    where = Surface(fine[0], triangles).closest(truth[0])
+    round_lips = fine.copy()
+    new = np.arange(model.n_vertices, fine.shape[1])
+    side = np.sign(fine[0, new, 1]) * (np.abs(fine[0, new, 1]) < 8.0)
+    round_lips[:, new, 1] -= 0.2 * side
+    found = []
+    for surface in (fine, round_lips):
+        reference = Reference("truth", where.sample(fine, triangles), surface, triangles)
+        result = evaluate_take(
+            {"base": truth}, FRAMES, model, regions, reference, 2, 1, LipTolerances()
+        )
+        table = result.table.set_index(["regressor", "frame"])["aperture_mm"]
+        found.append((table["truth"].to_numpy(), table["base"].to_numpy()))
+    (flat, own), (rounded, _) = found
+    assert np.abs(flat - own).max() < 0.05
+    # A column without a coarse vertex closes by twice 0.2 mm, one with a vertex on its rim by less.
+    assert ((flat - rounded > 0.2) & (flat - rounded < 0.4)).all()

@@ -34,12 +34,19 @@ def columns_of(model: FaceModel) -> np.ndarray:
     The columns stand side by side from the subject's right to their left, in the neutral.
     """
     sides = lip_sides(model, with_inside=True)
-    x = model.neutral_mm[:, 0]
-    vermilion = lip_sides(model) != 0
-    low, high = x[vermilion].min(), x[vermilion].max()
-    start, width = low + 0.25 * (high - low), 0.5 * (high - low) / N_COLUMNS
-    column = np.floor((x - start) / width).astype(np.int64)
-    return np.where((sides != 0) & (column >= 0) & (column < N_COLUMNS), column, -1)
+    return np.where(sides != 0, column_of_x(model, model.neutral_mm[:, 0]), -1)
+
+
+def column_of_x(model: FaceModel, x_mm: np.ndarray) -> np.ndarray:
+    """(n,) column of places across the mouth of the model's neutral, -1 outside the middle half.
+
+    Args:
+        x_mm: (n,) head frame.
+    """
+    x = model.neutral_mm[lip_sides(model) != 0, 0]
+    start, width = x.min() + 0.25 * np.ptp(x), 0.5 * np.ptp(x) / N_COLUMNS
+    column = np.floor((x_mm - start) / width).astype(np.int64)
+    return np.where((column >= 0) & (column < N_COLUMNS), column, -1)
 
 
 def lip_gaps(points_mm: np.ndarray, sides: np.ndarray, columns: np.ndarray) -> np.ndarray:

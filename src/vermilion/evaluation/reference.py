@@ -25,6 +25,7 @@ class Reference:
         vertices_mm: (F, S, 3) the surface itself.
         triangles: (U, 3) of the surface.
         neutral_mm: (V, 3) the points in the neutral, any head pose; None: the first frame is it.
+        neutral_surface_mm: (S, 3) the surface in the neutral, the pose of `neutral_mm`; None likewise.
     """
 
     kind: str
@@ -32,11 +33,18 @@ class Reference:
     vertices_mm: np.ndarray
     triangles: np.ndarray
     neutral_mm: np.ndarray | None = None
+    neutral_surface_mm: np.ndarray | None = None
 
     @property
     def rest_mm(self) -> np.ndarray:
         """(V, 3) the points in the neutral."""
         return self.points_mm[0] if self.neutral_mm is None else self.neutral_mm
+
+    @property
+    def rest_surface_mm(self) -> np.ndarray:
+        """(S, 3) the surface in the neutral."""
+        neutral = self.neutral_surface_mm
+        return np.asarray(self.vertices_mm[0] if neutral is None else neutral, dtype=np.float64)
 
     @property
     def valid(self) -> np.ndarray:
@@ -82,10 +90,9 @@ def reference_of(
     first = points[0][np.isfinite(points[0]).all(axis=1)]
     low, high = first.min(axis=0) - _CROP_MARGIN_MM, first.max(axis=0) + _CROP_MARGIN_MM
     near = ((vertices_mm[0] >= low) & (vertices_mm[0] <= high)).all(axis=1)
-    if neutral_mm is not None:
-        neutral_mm = where.sample(neutral_mm, triangles)
+    at_rest = None if neutral_mm is None else where.sample(neutral_mm, triangles)
     kept = triangles[near[triangles].all(axis=1)]
-    return Reference(kind, points, vertices_mm, kept, neutral_mm)
+    return Reference(kind, points, vertices_mm, kept, at_rest, neutral_mm)
 
 
 @dataclass(frozen=True)

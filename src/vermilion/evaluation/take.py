@@ -19,24 +19,18 @@ from vermilion.evaluation.errors import (
     surface_errors,
     vertex_errors,
 )
+from vermilion.evaluation.gap_points import GapPoints
 from vermilion.evaluation.kind_errors import sums_of_kinds
 from vermilion.evaluation.lip_errors import (
     sums_of_largest_errors,
     sums_of_motion_errors,
     sums_of_shape_errors,
 )
-from vermilion.evaluation.lips import (
-    LipTolerances,
-    aperture_mm,
-    columns_of,
-    lip_depths,
-    lip_gaps,
-)
+from vermilion.evaluation.lips import LipTolerances, aperture_mm, lip_depths
 from vermilion.evaluation.masks import Regions
 from vermilion.evaluation.mouth_kinds import kinds_of_curves, kinds_of_shapes
 from vermilion.evaluation.reference import Reference
 from vermilion.evaluation.statistics import clips_of
-from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import FrameAlignment, align_frames
 
@@ -100,15 +94,18 @@ def evaluate_take(
     head = align_frames(reference.points_mm, model.neutral_mm, regions.rest)
     kinds = _mouth_kinds(model, regions, reference, head, curves)
     clips = clips_of(frames, clip_frames, min_clips)
-    sides, columns = lip_sides(model, with_inside=True), columns_of(model)
     to_head = np.swapaxes(head.rotations, 1, 2)
-    true_gaps = lip_gaps(reference.points_mm @ to_head, sides, columns)
+    # Of the reference's own surface: a coarse mesh on it has its lips less far into the gap.
+    on_surface = GapPoints.on(
+        model, reference.rest_mm, reference.rest_surface_mm, reference.triangles
+    )
+    true_gaps = on_surface.gaps(reference.vertices_mm, to_head)
     surface = surface_errors(aligned, reference, regions.used)
-    # A lip vertex that has no counterpart is left out of both gaps.
-    columns = np.where(reference.valid, columns, -1)
+    # A lip vertex that has no counterpart is left out.
+    gap_points = GapPoints.of(model).without(~reference.valid)
     sums, errors, rows = {}, {}, [_frame_rows("truth", frames, None, regions, true_gaps, kinds)]
     for name, sequence in aligned.items():
-        gaps = lip_gaps(sequence @ to_head, sides, columns)
+        gaps = gap_points.gaps(sequence, to_head)
         through = lip_depths(sequence, model) > tolerances.through_mm
         errors[name] = vertex_errors(sequence, reference)
         sums[name] = (
