@@ -93,9 +93,10 @@ class GapPoints:
         return replace(self, columns=np.where(left_out, -1, self.columns))
 
     def gaps(self, sequence_mm: np.ndarray, to_head: np.ndarray) -> np.ndarray:
-        """Height of the gap in each column, (F, N_COLUMNS) mm, of meshes (F, S, 3).
+        """Height of the gap in each column, (F, N_COLUMNS) mm.
 
         Args:
+            sequence_mm: (F, S, 3) meshes, any world.
             to_head: (F, 3, 3), `points @ to_head` has the directions of the head frame.
         """
         used = self.columns >= 0
