@@ -95,11 +95,7 @@ def evaluate_take(
     kinds = _mouth_kinds(model, regions, reference, head, curves)
     clips = clips_of(frames, clip_frames, min_clips)
     to_head = np.swapaxes(head.rotations, 1, 2)
-    # Of the reference's own surface: a coarse mesh on it has its lips less far into the gap.
-    on_surface = GapPoints.on(
-        model, reference.rest_mm, reference.rest_surface_mm, reference.triangles
-    )
-    true_gaps = on_surface.gaps(reference.vertices_mm, to_head)
+    true_gaps = _gaps_of_surface(model, reference, to_head)
     surface = surface_errors(aligned, reference, regions.used)
     # A lip vertex that has no counterpart is left out.
     gap_points = GapPoints.of(model).without(~reference.valid)
@@ -121,6 +117,12 @@ def evaluate_take(
         rows.append(_frame_rows(name, frames, errors[name], regions, gaps, kinds))
     table = pd.concat(rows, ignore_index=True)
     return TakeResult(sums, table, aligned, errors, head, kinds, clips)
+
+
+def _gaps_of_surface(model: FaceModel, reference: Reference, to_head: np.ndarray) -> np.ndarray:
+    """(F, columns) mm of the reference's own surface: a coarse mesh on it has its lips less far in the gap."""
+    at_rest = reference.rest_mm, reference.rest_surface_mm
+    return GapPoints.on(model, *at_rest, reference.triangles).gaps(reference.vertices_mm, to_head)
 
 
 def _mouth_kinds(
