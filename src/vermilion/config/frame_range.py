@@ -12,6 +12,7 @@ from vermilion.imaging.frames import list_frames
 from vermilion.imaging.numbering import numbered_files
 from vermilion.imaging.source import is_video
 from vermilion.imaging.video import VideoReader
+from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
 
@@ -55,12 +56,11 @@ def _mesh_range(source: Path) -> tuple[int, int]:
     if source.is_dir():
         numbers: Sequence[int] = list(numbered_files(source, MESH_SUFFIXES))
     elif source.suffix.lower() == ".npz":
-        try:
-            with np.load(source, allow_pickle=False) as data:
-                named = "frames" in data.files
-                numbers = data["frames"].tolist() if named else range(len(data["vertices_mm"]))
-        except (OSError, ValueError, KeyError, EOFError, TypeError) as error:
-            raise _silent(source) from error
+        data = read_arrays(source, "mesh sequence", remedy="Export it again.")
+        named = data.get("frames", np.arange(len(np.atleast_1d(data["vertices_mm"]))))
+        if named.ndim != 1 or named.dtype.kind not in "iuf" or not np.isfinite(named).all():
+            raise _silent(source)
+        numbers = named.tolist()
     else:
         raise _silent(source)
     if not len(numbers):

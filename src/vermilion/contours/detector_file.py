@@ -9,7 +9,7 @@ from vermilion.contours.channels import CHANNELS
 from vermilion.contours.detector import FORMAT_VERSION, ContourDetector
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.track_ridge import TrackRidgeDetector
-from vermilion.storage.arrays import read_arrays
+from vermilion.storage.arrays import format_version, read_arrays
 from vermilion.storage.errors import ModelFileError
 
 _KINDS = {kind.kind: kind for kind in (BoostedDetector, TrackRidgeDetector, LandmarkRidgeDetector)}
@@ -25,7 +25,7 @@ def load_detector(path: str | Path) -> ContourDetector:
     hint = "Remove the file and run again: the detector is trained anew."
     arrays = read_arrays(path, "contour detector", error=ModelFileError)
     try:
-        version, kind = int(arrays["format_version"]), str(arrays["kind"])
+        version, kind = format_version(arrays), str(arrays["kind"])
         if version != FORMAT_VERSION or kind not in _KINDS:
             raise ModelFileError(f"format {version}, kind {kind}", expected, hint, path=path)
         if kind == BoostedDetector.kind and tuple(arrays["channels"]) != CHANNELS:

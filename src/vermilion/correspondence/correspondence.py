@@ -18,7 +18,7 @@ from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
-from vermilion.storage.arrays import read_arrays, write_arrays
+from vermilion.storage.arrays import format_version, read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 
 FORMAT_VERSION = 1
@@ -83,7 +83,7 @@ class Correspondence:
     def load(cls, path: str | Path) -> Correspondence:
         """Read what `save` wrote. Raises InputError on a damaged file or another format."""
         arrays = read_arrays(path, "correspondence")
-        version = int(arrays.get("format_version", -1))
+        version = format_version(arrays)
         if version != FORMAT_VERSION:
             raise InputError(
                 f"correspondence format {version}",

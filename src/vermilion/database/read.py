@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from vermilion.database.schema import FORMAT, FORMAT_VERSION, TakeEntry
 from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
+from vermilion.storage.hdf5 import DAMAGE, open_hdf5
 
 #: Fewer frames cannot be cross-validated.
 MIN_FRAMES = 5
@@ -30,23 +30,31 @@ class LipDatabase:
     """
 
     def __init__(self, path: str | Path):
-        try:
-            self._file = h5py.File(path, "r")
-        except OSError as error:
-            raise InputError(
-                f"no readable database ({error})",
+        def unreadable(why: str) -> InputError:
+            return InputError(
+                f"no readable database ({why})",
                 "an HDF5 that the rule `database` wrote",
                 "Remove the file and run again.",
                 path=path,
-            ) from error
-        found = (self._file.attrs.get("format"), int(self._file.attrs.get("format_version", -1)))
+            )
+
+        self._file = open_hdf5(path, unreadable)
+        found = tuple(self._file.attrs.get(key) for key in ("format", "format_version"))
         if found != (FORMAT, FORMAT_VERSION):
+            self._file.close()
             raise InputError(
                 f"format {found[0]!r}, version {found[1]}",
                 f"{FORMAT!r}, version {FORMAT_VERSION}",
                 "Rebuild it with this version of Vermilion.",
                 path=path,
             )
+        try:
+            self._read_facts()
+        except DAMAGE as error:
+            self._file.close()
+            raise unreadable(f"{error}") from error
+
+    def _read_facts(self) -> None:
         file = self._file
         self.triangles = file["topology/triangles"][:]
         self.topology = str(file["topology/triangles"].attrs["sha256"])

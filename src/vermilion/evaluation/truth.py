@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from vermilion.storage.arrays import read_array
 from vermilion.storage.errors import InputError
+from vermilion.storage.json_files import load_json
 from vermilion.storage.sequences import read_sequence
 
 _HINT = "Correct the folder that evaluation.truth names, or leave the key empty."
@@ -31,13 +32,7 @@ def read_truth(
     """
     sequence = read_sequence(vertices)
     _check_length(len(sequence), rows, vertices, place)
-    try:
-        corners = np.load(triangles, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(
-            f"unreadable triangles ({error})", "a .npy of (triangles, 3)", _HINT,
-            path=triangles, **place,
-        ) from error  # fmt: skip
+    corners = read_array(triangles, "triangles", **place)
     if corners.ndim != 2 or corners.shape[1] != 3 or corners.max(initial=0) >= sequence.shape[1]:
         raise InputError(
             f"triangles {corners.shape} with vertices up to {corners.max(initial=0)}",
@@ -52,8 +47,8 @@ def read_truth(
 def read_curves(path: str | Path, rows: Iterable[int], **place) -> list[dict[str, float]]:
     """Expression weights of the frames at `rows` of the take, a dict each."""
     try:
-        curves = json.loads(Path(path).read_text(encoding="utf-8"))
-    except ValueError as error:
+        curves = load_json(path)
+    except (OSError, ValueError) as error:
         raise InputError(
             f"unreadable curves ({error})", "a JSON list of {curve: weight}, one a frame", _HINT,
             path=path, **place,

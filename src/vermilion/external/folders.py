@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from zipfile import BadZipFile
-
 import numpy as np
 
 from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_polygons
 from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.numbering import numbered_files
+from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
 
@@ -86,18 +85,14 @@ def read_archive(request: Request) -> RawSequence:
 
     Raises InputError where the arrays are missing or of other shapes.
     """
-    try:
-        with np.load(request.path, allow_pickle=False) as data:
-            named = "vertices_mm" in data.files
-            vertices = data["vertices_mm" if named else "vertices"]
-            faces = data["quads" if "quads" in data.files else "triangles"]
-            numbers = data["frames"] if "frames" in data.files else np.arange(len(vertices))
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise request.error(
-            f"an unreadable file ({error})",
-            "a .npz with vertices_mm (F, V, 3) and triangles (T, 3)",
-            "Export it again.",
-        ) from error
+    data = read_arrays(
+        request.path, "mesh sequence", remedy="Export it again: vertices_mm (F, V, 3), triangles (T, 3).",
+        **request.place,
+    )  # fmt: skip
+    named = "vertices_mm" in data
+    vertices = data["vertices_mm" if named else "vertices"]
+    faces = data["quads" if "quads" in data else "triangles"]
+    numbers = data.get("frames", np.arange(len(vertices) if vertices.ndim else 0))
     shaped = vertices.ndim == 3 and vertices.shape[2] == 3
     if not shaped or faces.ndim != 2 or faces.shape[1] not in (3, 4) or len(faces) == 0:
         raise request.error(

@@ -15,6 +15,7 @@ from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 from vermilion.storage.errors import ModelFileError
 from vermilion.storage.files import atomic_path
+from vermilion.storage.hdf5 import DAMAGE, open_hdf5
 
 FORMAT = "vermilion-regressor"
 FORMAT_VERSION = 4
@@ -166,17 +167,21 @@ def load_model(path: str | Path) -> LipModel:
     Raises ModelFileError, each with its own message, where the file is damaged, is no model, or
     comes from a newer version.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            _check_header(file, path)
-            return _read(file)
-    except (OSError, KeyError, ValueError, RuntimeError) as error:
-        raise ModelFileError(
-            f"a truncated or damaged model file ({error})",
+
+    def unreadable(why: str) -> ModelFileError:
+        return ModelFileError(
+            f"a truncated or damaged model file ({why})",
             "a whole file as the rule `train` wrote it",
             "Copy it again, or remove it and run again.",
             path=path,
-        ) from error
+        )
+
+    with open_hdf5(path, unreadable) as file:
+        try:
+            _check_header(file, path)
+            return _read(file)
+        except DAMAGE as error:
+            raise unreadable(f"{error}") from error
 
 
 def _check_header(file: h5py.File, path: str | Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.storage.arrays import write_array
+from vermilion.storage.arrays import DAMAGE, write_array
 from vermilion.storage.errors import InputError
 
 
@@ -28,7 +28,9 @@ def read_sequence(paths: str | Path | Sequence[str | Path]) -> np.ndarray:
 def _open_sequence(path: str | Path) -> np.ndarray:
     try:
         vertices = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        if not isinstance(vertices, np.ndarray):
+            raise ValueError("several arrays")
+    except DAMAGE as error:
         raise InputError(
             f"an unreadable mesh sequence ({error})",
             "a .npy of (frames, vertices, 3)",

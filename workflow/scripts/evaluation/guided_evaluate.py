@@ -11,6 +11,7 @@ from vermilion.guided.regions import regions_of_face
 from vermilion.multiview.files import read_neutral
 from vermilion.report.guided_curve import draw_guided_curve
 from vermilion.report.guided_sheet import draw_guided_sheet
+from vermilion.storage.arrays import read_array
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
@@ -23,7 +24,7 @@ def neutral_of(inputs, n_vertices):
     """The person's neutral (V, 3): of H, or the true one."""
     if str(inputs.neutral).endswith(".npz"):
         return read_neutral(inputs.neutral, n_vertices)
-    return np.load(inputs.neutral, allow_pickle=False).astype(np.float64)
+    return read_array(inputs.neutral, "neutral").astype(np.float64)
 
 
 def main(snakemake):

@@ -1,7 +1,6 @@
 """The report page of a take: report.html; and the drift of all its frames: drift.tsv."""
 
 import cv2
-import numpy as np
 import pandas as pd
 
 from vermilion.faces.model import FaceModel
@@ -13,6 +12,7 @@ from vermilion.multiview.take import MultiviewImages, RefineSettings
 from vermilion.report.multiview_page import TakeFindings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
+from vermilion.storage.arrays import read_array
 from vermilion.storage.files import write_text
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
@@ -60,7 +60,7 @@ def main(snakemake):
         frames, snakemake.params.neutral, report["spaced_frames"], report["flagged_frames"]
     )
     meshes = rows_at(inputs.meshes, why, read_sequence)
-    seeing = rows_at(inputs.visibility, why, lambda path: np.load(path, mmap_mode="r"))
+    seeing = rows_at(inputs.visibility, why, lambda path: read_array(path, "visibility"))
     shown = [
         sheets.draw(number, reason, meshes.get(number), seeing.get(number))
         for number, reason in progress(list(why.items()), "sheets")
