@@ -39,6 +39,7 @@ class Arrays(dict[str, np.ndarray]):
     """Arrays of a file by name; one that is missing is the file's fault and raises its error."""
 
     def __init__(self, values: dict[str, np.ndarray], missing: Callable[[str], Exception]):
+        """The `values` (...,) of any shape, and the error of a name that is `missing`."""
         super().__init__(values)
         self._missing = missing
 
@@ -100,7 +101,7 @@ def read_arrays(
 
 
 def read_array(path: str | Path, what: str, **place: Any) -> np.ndarray:
-    """Read a `.npy` file. Raises InputError with the `place` where it is missing or damaged."""
+    """The array (...,) of a `.npy` file, of any shape. Raises InputError with the `place` where it is missing or damaged."""
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
         if not isinstance(array, np.ndarray):
@@ -117,7 +118,7 @@ def read_array(path: str | Path, what: str, **place: Any) -> np.ndarray:
 
 
 def format_version(arrays: dict[str, np.ndarray]) -> int:
-    """The number `format_version` of a file of ours; -1 where it has none."""
+    """The number `format_version` among the `arrays` (...,) of a file; -1 where there is none."""
     try:
         return int(arrays.get("format_version", -1))
     except (TypeError, ValueError):
