@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run cameras sketch doctor report verify test test-quick test-latest test-interchange lint format docs reference clean
+.PHONY: help setup demo lips run cameras plates sketch doctor report verify test test-quick test-latest test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -17,6 +17,7 @@ help:
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
 	@echo "make doctor      say what is missing, and what to do about it"
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
+	@echo "make plates      frontal images of CONFIG without tattoo, with their camera, for your tracker"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make test-latest the quick tests with the newest versions of all packages"
@@ -56,6 +57,10 @@ sketch: $(READY)
 
 cameras: $(READY)
 	@$(VERMILION) cameras "$(CONFIG)"
+
+plates: $(READY)
+	@$(VERMILION) plates "$(CONFIG)" $(if $(TAKE),--take "$(TAKE)") $(if $(FORMAT),--format $(FORMAT)) \
+	    $(if $(OUT),--out "$(OUT)")
 
 report: $(READY)
 	@$(VERMILION) report "$(CONFIG)"

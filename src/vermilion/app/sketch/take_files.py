@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from vermilion.app.run_files import PATHS, read_configuration, results_paths
 from vermilion.config.external_base import sequences_of
 from vermilion.config.guided import GuidedConfig
-from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.root import Configuration
-from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
 from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
-
-#: The workflow's own list of paths, which is plain Python.
-PATHS = Path("workflow/rules/paths.smk")
 
 
 @dataclass(frozen=True)
@@ -75,7 +70,7 @@ class TakeFiles:
             )
         take = next(take for take in takes if take.name == name)
         sequence = config.guided.takes[name]
-        patterns = _results_paths(paths, config)
+        patterns = results_paths(config, paths)
 
         def fill(pattern: str) -> Path:
             place = {"subject": take.subject, "take": take.take}
@@ -125,24 +120,6 @@ class TakeFiles:
 def existing(pattern: Path) -> list[Path]:
     """Files of a pattern whose last part has a `*`, ascending."""
     return sorted(pattern.parent.glob(pattern.name))
-
-
-def read_configuration(path: str) -> tuple[Configuration, list[Take]]:
-    """The checked configuration and take sheet of a file, without the takes that it leaves out."""
-    return without_skipped(*load_configuration(read_keys(path), path))
-
-
-def _results_paths(paths: Path, config: Configuration) -> Any:
-    """The class `P` of the workflow's paths for a configuration."""
-    names: dict[str, Any] = {"CONFIG": config}
-    try:
-        text = paths.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            "no workflow in this folder", f"the file {paths}", "Start it in Vermilion's folder."
-        ) from error
-    exec(compile(text, str(paths), "exec"), names)
-    return names["P"]
 
 
 def _source(take: Take, config: Configuration, capture_folder: str) -> Source:
