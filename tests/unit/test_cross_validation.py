@@ -5,7 +5,7 @@ import pytest
 from sklearn.model_selection import GroupKFold
 
 from tests.unit.regression_data import smooth_data
-from vermilion.regression.cross_validation import clips_of, cross_validate, target_gram
+from vermilion.regression.cross_validation import clips_of, cross_validate, folds_of, target_gram
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork, temporal_prototypes
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import unseen_subject_bias
@@ -35,6 +35,16 @@ def test_clips_are_contiguous_and_never_cross_sequences():
     assert np.all(np.diff(clips) >= 0)
     assert not set(clips[:70]) & set(clips[70:])
     assert len(np.unique(clips_of(np.zeros(9), 30, 5))) >= 5
+
+
+@pytest.mark.parametrize("n_folds", [2, 5, 40])
+def test_folds_are_those_of_group_k_fold(n_folds):
+    clips = np.random.default_rng(3).integers(0, 17, 200)
+    ours = folds_of(clips, n_folds)
+    theirs = GroupKFold(min(n_folds, 17)).split(clips, groups=clips)
+    for fold, (train, held) in zip(ours, theirs, strict=True):
+        assert np.array_equal(fold[0], train)
+        assert np.array_equal(fold[1], held)
 
 
 def test_cross_validation_equals_fitting_and_predicting(data):

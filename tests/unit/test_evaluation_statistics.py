@@ -21,7 +21,20 @@ def test_histogram_quantile_is_the_quantile_of_repeated_values_within_a_bin():
     repeated = np.repeat(values.ravel(), np.tile(weights, 7))
     for q in (0.5, 0.95):
         exact = np.quantile(repeated, q)
-        assert abs(histogram_quantile(histograms(values, weights).sum(axis=0), q) - exact) < 0.01
+        found = histogram_quantile(histograms(values, weights), q, np.ones((1, 7)))
+        assert abs(found[0] - exact) < 0.01
+
+
+def test_quantile_of_a_sample_is_that_of_its_clips_joined():
+    rng = np.random.default_rng(4)
+    clips = histograms(rng.gamma(2.0, 0.8, (5, 40)), rng.integers(0, 4, 40))
+    draws = np.array([[1, 0, 2, 0, 2], [0, 0, 0, 5, 0], [0, 0, 0, 0, 0]])
+    for q in (0.5, 0.95):
+        found = histogram_quantile(clips, q, draws)
+        assert np.isnan(found[2])
+        for sample in (0, 1):
+            joined = np.repeat(clips, draws[sample], axis=0).sum(axis=0, keepdims=True)
+            assert found[sample] == pytest.approx(histogram_quantile(joined, q, [[1]])[0])
 
 
 def test_clips_break_at_gaps_and_at_their_length():

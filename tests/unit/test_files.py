@@ -1,6 +1,7 @@
 """Whole files or none; tables, sequences and quality rows round-trip."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from vermilion.geometry.mesh import Mesh
@@ -66,6 +67,19 @@ def test_table_names_its_missing_column(tmp_path):
     assert read_table(tmp_path / "t.tsv")["a_mm"][0] == 1.25
     with pytest.raises(InputError, match="b_px"):
         read_table(tmp_path / "t.tsv", ["b_px"])
+
+
+def test_rows_are_written_as_pandas_writes_them(tmp_path):
+    rows = [
+        {"frame": 1, "a_mm": 1.25, "reason": "a\ttab", "b": np.nan, "found": True},
+        {"frame": np.int64(3), "a_mm": np.float32(0.1), "reason": 'a "word"', "b": 2.0},
+        {"frame": 7, "a_mm": np.inf, "reason": "", "b": 123456.789012, "late": None},
+    ]
+    write_table(tmp_path / "rows.tsv", rows)
+    write_table(tmp_path / "table.tsv", pd.DataFrame(rows))
+    assert (tmp_path / "rows.tsv").read_text() == (tmp_path / "table.tsv").read_text()
+    write_table(tmp_path / "none.tsv", [], ["frame", "a_mm"])
+    assert (tmp_path / "none.tsv").read_text() == "frame\ta_mm\n"
 
 
 def test_flagged_frames_and_warnings_carry_their_reason(tmp_path):

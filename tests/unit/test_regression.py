@@ -5,6 +5,9 @@ import pytest
 from sklearn.base import clone
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import (
@@ -113,8 +116,21 @@ def test_scikit_learn_contract():
     network = clone(RBFNetwork(alpha=3.0, beta=2.0))
     assert network.get_params()["alpha"] == 3.0
     assert network.set_params(beta=5.0).beta == 5.0
+    with pytest.raises(ValueError, match="RBFNetwork has no 'gamma'; it has alpha"):
+        network.set_params(gamma=1.0)
+    with pytest.raises(AttributeError, match="not fitted"):
+        network.predict(np.zeros((2, 6)))
     with pytest.raises(ValueError, match=r"features must be \(F, 7\), got \(2, 6\)"):
         AffineRegressor().fit(np.eye(7), np.eye(7)).predict(np.zeros((2, 6)))
+
+
+def test_scikit_learn_searches_and_scores_a_regressor_in_a_pipeline(data):
+    features, _ = data
+    steps = make_pipeline(StandardScaler(), AffineRegressor())
+    search = GridSearchCV(steps, {"affineregressor__alpha": [1e-3, 1e9]}, cv=3)
+    search.fit(features, features @ np.ones((features.shape[1], 2)))
+    assert search.best_params_ == {"affineregressor__alpha": 1e-3}
+    assert search.best_score_ > 0.99
 
 
 def test_scale_gives_unit_total_variance_whatever_the_number_of_features(data):

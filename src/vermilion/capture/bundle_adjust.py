@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pycolmap
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from vermilion.capture.tracks import Tracks
@@ -169,6 +168,8 @@ def align_to_given(
     goal = np.stack([given[n].centre_mm for n in names])
     start = np.stack([moved[n].centre_mm for n in names])
     middle, target = start.mean(axis=0), goal.mean(axis=0)
+    from scipy.optimize import least_squares
+
     turned = Rotation.from_matrix(old.transpose(0, 2, 1) @ new)  # rotation from moved to given
     first = turned.mean()
 

@@ -15,7 +15,6 @@ from vermilion.capture.video_facts import VideoFacts, rate_warning, video_facts
 from vermilion.imaging.frames import list_frames, reading_of
 from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
-from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError, describe_problem
 from vermilion.storage.files import write_text
 from vermilion.storage.progress import progress
@@ -227,6 +226,8 @@ def _video_manifest(
     hash_decoded: bool,
     facts: VideoFacts,
 ) -> Manifest:
+    from vermilion.imaging.video import VideoReader
+
     reader = VideoReader(source, facts.index)
     place = {"subject": subject, "take": take}
     camera = cameras[0] if cameras else "cam"

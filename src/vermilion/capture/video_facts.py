@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vermilion.imaging.video import VideoIndex, VideoReader
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import sha256_of, write_text
+
+if TYPE_CHECKING:
+    from vermilion.imaging.video import VideoIndex
 
 FORMAT_VERSION = 1
 #: Part of the median interval by which intervals of an even video may differ (rounded time stamps).
@@ -41,6 +44,8 @@ class VideoFacts:
 
     @property
     def index(self) -> VideoIndex:
+        from vermilion.imaging.video import VideoIndex
+
         return VideoIndex(self.stamps, self.keys)
 
     @property
@@ -68,6 +73,8 @@ class VideoFacts:
 
 def video_facts(path: str | Path) -> VideoFacts:
     """Read a video file once: hash it and list its frames."""
+    from vermilion.imaging.video import VideoReader
+
     path = Path(path)
     reader = VideoReader(path)
     return VideoFacts(

@@ -11,7 +11,6 @@ from vermilion.geometry.mesh_files import MESH_SUFFIXES
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.numbering import numbered_files
 from vermilion.imaging.source import is_video
-from vermilion.imaging.video import VideoReader
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
@@ -35,6 +34,8 @@ def frame_range(source: str | Path, role: str) -> tuple[int, int]:
     if source.is_file():
         if not is_video(source):
             raise _silent(source)
+        from vermilion.imaging.video import VideoReader
+
         return 0, VideoReader(source).n_frames - 1
     cameras = sorted(p for p in (source / "frames").glob("*") if p.is_dir()) or [source]
     frames = [list_frames(camera) for camera in cameras]

@@ -21,7 +21,6 @@ from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import AS_TAGGED, IMAGE_SUFFIXES, ImageReading, refusal
 from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
-from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import ConfigurationError, InputError, VermilionError
 
 
@@ -112,6 +111,8 @@ def check_source(take: Take, reading: ImageReading = AS_TAGGED) -> list[str]:
                 f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES)}. Convert "
                 f"it: `ffmpeg -i {source.name} -crf 12 {source.stem}.mp4`."
             ]
+        from vermilion.imaging.video import VideoReader
+
         try:
             reader = VideoReader(source)
             count, _ = reader.n_frames, reader.size

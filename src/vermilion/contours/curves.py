@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from vermilion.imaging.sampling import sample_bilinear
@@ -19,6 +18,8 @@ def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray
     The first point and the one farthest from it (the other corner, as the 66-point scheme has
     them) are where the upper and the lower half meet.
     """
+    from scipy.interpolate import CubicSpline
+
     half = int(np.argmax(np.linalg.norm(loop_px - loop_px[0], axis=1)))
     halves = []
     for part in (loop_px[: half + 1], np.concatenate([loop_px[half:], loop_px[:1]])):

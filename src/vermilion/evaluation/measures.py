@@ -151,8 +151,9 @@ def _ratio_to_base(sums, base, measure, region, above, below, draws):
 def _surface(sums, region, draws):
     histogram, largest = sums[f"{region}.histogram"], sums[f"{region}.max"]
     for measure, q in _QUANTILES:
-        sampled = histogram_quantile(draws @ histogram, q)
-        yield measure, region, "mm", float(histogram_quantile(histogram.sum(axis=0), q)), sampled
+        everything = np.ones((1, draws.shape[1]), dtype=np.int64)
+        whole, sampled = (histogram_quantile(histogram, q, d) for d in (everything, draws))
+        yield measure, region, "mm", float(whole[0]), sampled
     sampled = np.where(draws > 0, largest, 0.0).max(axis=1)
     yield "surface_error_max_mm", region, "mm", float(largest.max()), sampled
 

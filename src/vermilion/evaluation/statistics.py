@@ -25,16 +25,40 @@ def histograms(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return counts.reshape(len(values), N_BINS)
 
 
-def histogram_quantile(histogram: np.ndarray, q: float) -> np.ndarray:
-    """Quantile in mm of each `histogram` (..., N_BINS), interpolated within the bin."""
-    cumulative = np.cumsum(histogram, axis=-1)
-    target = q * cumulative[..., -1:]
-    place = np.minimum((cumulative < target).sum(axis=-1, keepdims=True), N_BINS - 1)
-    inside = np.take_along_axis(histogram, place, axis=-1)
-    before = np.take_along_axis(cumulative, place, axis=-1) - inside
+def histogram_quantile(histogram: np.ndarray, q: float, draws: np.ndarray) -> np.ndarray:
+    """Quantile in mm, interpolated within the bin, of sums of clips' histograms.
+
+    The bin is found by bisection of the clips' cumulative histograms: the histogram of a sample is
+    never formed.
+
+    Args:
+        histogram: (clips, N_BINS) weight in each bin.
+        q: 0 to 1.
+        draws: (samples, clips) how often each sample has each clip.
+
+    Returns:
+        (samples,); NaN where a sample has no weight.
+    """
+    cumulative = np.cumsum(histogram, axis=1).T
+    counts = np.asarray(draws, dtype=np.float64)
+
+    def below(last: np.ndarray) -> np.ndarray:
+        """Weight of each sample in the bins up to `last` (samples,)."""
+        return (counts * cumulative[last]).sum(axis=1)
+
+    n_bins = len(cumulative)
+    whole = counts @ cumulative[-1]
+    target = q * whole
+    low, high = np.zeros(len(counts), np.int64), np.full(len(counts), n_bins - 1)
+    while (low < high).any():
+        middle = (low + high) // 2
+        short = below(middle) < target
+        low, high = np.where(short, middle + 1, low), np.where(short, high, middle)
+        low = np.minimum(low, high)
+    inside = (counts * histogram.T[low]).sum(axis=1)
+    before = below(low) - inside
     share = np.divide(target - before, inside, out=np.zeros_like(inside), where=inside > 0)
-    value = (place + share)[..., 0] * BIN_MM
-    return np.where(cumulative[..., -1] > 0, value, np.nan)
+    return np.where(whole > 0, (low + share) * BIN_MM, np.nan)
 
 
 def clips_of(frames: np.ndarray, clip_frames: int, min_clips: int = 1) -> np.ndarray:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from vermilion.storage.files import atomic_path
 
@@ -27,6 +26,8 @@ def write_weights(
     """
     if weights.shape != (len(frames), len(names)):
         raise ValueError(f"weights must be ({len(frames)}, {len(names)}), got {weights.shape}")
+    import pandas as pd
+
     table = pd.DataFrame(weights, columns=list(names))
     table.insert(0, "frame", frames)
     table.insert(1, "time_s", np.round((np.asarray(frames) - frames[0]) / fps, 6))

@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
@@ -110,6 +109,8 @@ def without_spurs(loop: np.ndarray) -> np.ndarray:
 
 def _spline(knots: np.ndarray) -> np.ndarray:
     """Dense points of the natural cubic spline through the knots, (60 n, 3)."""
+    from scipy.interpolate import CubicSpline
+
     chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
     places = np.linspace(0, chord[-1], 60 * len(knots))
     return CubicSpline(chord, knots, bc_type="natural")(places)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import cv2
-import matplotlib
 import numpy as np
 
 from vermilion.geometry.camera import Camera
@@ -114,6 +113,8 @@ def colour_map(
     values: np.ndarray | float, low: float, high: float, name: str = "turbo"
 ) -> np.ndarray:
     """`values` (...,) as RGB (..., 3) in [0, 1]; NaN is grey."""
+    import matplotlib  # slow to import, and most drawings have no colour map
+
     scaled = (np.asarray(values, dtype=float) - low) / (high - low)
     rgb = matplotlib.colormaps[name](np.clip(np.nan_to_num(scaled), 0, 1))[..., :3]
     return np.where(np.isnan(scaled)[..., None], 0.5, rgb)

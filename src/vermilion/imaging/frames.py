@@ -18,7 +18,6 @@ from vermilion.imaging.images import (
 )
 from vermilion.imaging.numbering import numbered_files
 from vermilion.imaging.source import VIDEO_SUFFIXES, Source, is_video, source_path
-from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
 
 
@@ -115,6 +114,8 @@ class VideoFrames:
     """A video file: one camera, frames counted from 0 in presentation order."""
 
     def __init__(self, path: str | Path, subject: str = "", take: str = ""):
+        from vermilion.imaging.video import VideoReader  # FFmpeg: slow to load
+
         self.subject, self.take = subject, take
         self._reader = VideoReader(path)
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from vermilion.landmarks.cuts import find_cuts, pieces_of
 from vermilion.landmarks.faces import SeenFaces
@@ -92,9 +91,11 @@ class FollowedFace:
             last = reason
         return told
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> list[dict]:
         """A row a frame."""
-        return pd.DataFrame({name: getattr(self, name) for name in self.__dataclass_fields__})
+        names = tuple(self.__dataclass_fields__)
+        columns = (getattr(self, name) for name in names)
+        return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""

@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from vermilion.landmarks.binary_patterns import PatternSettings, ReferenceShape, describe
 from vermilion.landmarks.descent import ImageSimilarity
@@ -61,17 +60,21 @@ class KeyFrames:
         rows = np.flatnonzero(self.kinds == GIVEN)
         return {int(self.frames[row]): self.points_px[row] for row in rows}
 
-    def table(self) -> pd.DataFrame:
+    def table(self) -> list[dict]:
         """A row a frame of the take: its distances and, for key frames, what kind they are."""
         kinds = dict(zip(self.frames.tolist(), self.kinds.tolist(), strict=True))
-        frames = self.take_frames.tolist()
-        columns = {
-            "frame": frames,
-            "key_frame": [kinds.get(frame, "") for frame in frames],
-            "region_distance": self.region_distance,
-            "patch_distance": self.patch_distance,
-        }
-        return pd.DataFrame(columns).replace(np.inf, np.nan)
+        distances = zip(
+            self.take_frames.tolist(), self.region_distance, self.patch_distance, strict=True
+        )
+        return [
+            {
+                "frame": frame,
+                "key_frame": kinds.get(frame, ""),
+                "region_distance": region if np.isfinite(region) else np.nan,
+                "patch_distance": patch if np.isfinite(patch) else np.nan,
+            }
+            for frame, region, patch in distances
+        ]
 
     def save(self, path: str | Path) -> None:
         """Write `.npz`, whole or not at all."""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
 from vermilion.storage.errors import InputError
 from vermilion.storage.tables import read_delimited
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ def read_landmark_csv(
     Raises:
         InputError: a column is missing, or a value is no number.
     """
+    import pandas as pd
+
     table = read_delimited(path, ",", skipinitialspace=True)
     table.columns = [str(name).strip() for name in table.columns]
     n_points = _count_points(table, path)

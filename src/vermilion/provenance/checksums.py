@@ -95,7 +95,7 @@ def record(
         if (results / label).exists():
             entries.update(old)
     rows = [{"path": name, **entries[name]} for name in sorted(entries)]
-    write_table(results / LEDGER, pd.DataFrame(rows, columns=list(COLUMNS)))
+    write_table(results / LEDGER, rows, COLUMNS)
     return refused
 
 

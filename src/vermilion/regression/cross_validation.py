@@ -14,8 +14,6 @@ from typing import Literal
 
 import numpy as np
 from scipy import linalg, sparse
-from sklearn.base import clone
-from sklearn.model_selection import GroupKFold
 
 from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.ridge import person_averages
@@ -137,7 +135,7 @@ def cross_validate(
     folds = folds_of(clips, n_folds)
     errors, freedom = [], []
     for beta in [np.nan] if betas is None else betas:
-        tried = clone(estimator)
+        tried = estimator.unfitted()
         if betas is not None:
             tried.set_params(beta=beta)
         of_folds = []
@@ -170,18 +168,28 @@ def held_out_novelty(
     """
     novelty = np.empty(len(features))
     for train, held in folds_of(clips, n_folds):
-        tried = clone(estimator)
+        tried = estimator.unfitted()
         tried.fit_inputs(features[train], sequences[train])
         novelty[held] = tried.novelty(features[held])
     return novelty
 
 
 def folds_of(clips: np.ndarray, n_folds: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Rows to train on and rows to judge of each fold; clips (F,) stay whole."""
-    n_folds = min(n_folds, len(np.unique(clips)))
+    """Rows to train on and rows to judge of each fold; clips (F,) stay whole.
+
+    The longest clip goes to the fold with the fewest rows so far, as in scikit-learn's `GroupKFold`.
+    """
+    _, label = np.unique(clips, return_inverse=True)
+    lengths = np.bincount(label)
+    n_folds = min(n_folds, len(lengths))
     if n_folds < 2:
         raise ValueError("cross-validation needs at least two clips")
-    return list(GroupKFold(n_folds).split(clips, groups=clips))
+    rows_of_fold, fold_of_clip = np.zeros(n_folds, np.int64), np.empty(len(lengths), np.int64)
+    for clip in np.argsort(lengths, kind="stable")[::-1]:
+        fold_of_clip[clip] = np.argmin(rows_of_fold)
+        rows_of_fold[fold_of_clip[clip]] += lengths[clip]
+    fold = fold_of_clip[label]
+    return [(np.flatnonzero(fold != k), np.flatnonzero(fold == k)) for k in range(n_folds)]
 
 
 def _degrees_of_freedom(design: np.ndarray, alphas: Sequence[float]) -> np.ndarray:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from scipy import linalg
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted
 
 from vermilion.regression.ridge import person_averages, ridge_weights
 from vermilion.regression.scaling import feature_range, feature_scale, trust
 
+if TYPE_CHECKING:
+    from sklearn.utils import Tags
 
-class LinearOutputs(RegressorMixin, BaseEstimator):
+
+class LinearOutputs:
     """Linear outputs of a design matrix, which a subclass makes of the features.
+
+    The interface is scikit-learn's (`clone`, pipelines and searches take it), without its base class: its
+    import takes a second, which every job that reads a regressor would spend.
 
     Args:
         alpha: ridge parameter of the weights; the bias is not penalised.
@@ -60,6 +65,37 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
         self.fade = fade
         self.equalise = equalise
         self.basis_error = basis_error
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The parameters of the constructor by name."""
+        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters of the constructor; raises ValueError for any other name."""
+        known = self.get_params()
+        for name, value in parameters.items():
+            if name not in known:
+                raise ValueError(
+                    f"{type(self).__name__} has no {name!r}; it has {', '.join(known)}"
+                )
+            setattr(self, name, value)
+        return self
+
+    def unfitted(self) -> Self:
+        """Another one with the same parameters."""
+        return type(self)(**self.get_params())
+
+    def score(self, features: np.ndarray, targets: np.ndarray) -> float:
+        """Coefficient of determination of the predictions for features (F, M), targets (F, K)."""
+        from sklearn.metrics import r2_score
+
+        return float(r2_score(targets, self.predict(features)))
+
+    def __sklearn_tags__(self) -> Tags:
+        from sklearn.utils import RegressorTags, Tags, TargetTags
+
+        targets = TargetTags(required=True, multi_output=True)
+        return Tags(estimator_type="regressor", target_tags=targets, regressor_tags=RegressorTags())
 
     def _choose(self, scaled: np.ndarray, sequences: np.ndarray | None) -> None:
         """Fit what the design needs to know of the scaled features (F, M)."""
@@ -136,7 +172,8 @@ class LinearOutputs(RegressorMixin, BaseEstimator):
 
     def scaled(self, features: np.ndarray) -> np.ndarray:
         """`features` (F, M) in the estimator's own scale, (F, M) float64."""
-        check_is_fitted(self, "feature_scale_")
+        if not hasattr(self, "feature_scale_"):
+            raise AttributeError(f"this {type(self).__name__} is not fitted: call `fit` first")
         features = np.asarray(features, dtype=np.float64)
         if features.ndim != 2 or features.shape[1] != self.n_features_in_:
             raise ValueError(f"features must be (F, {self.n_features_in_}), got {features.shape}")

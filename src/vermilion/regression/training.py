@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from vermilion.config.regressors import VARIANTS, Estimator, split_name
 from vermilion.regression.cross_validation import (
@@ -24,6 +23,9 @@ from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
 from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Fewer people tell nothing of unseen subjects: folds of GR are then clips, as those of PS and MS.
 LEAST_PEOPLE = 3
@@ -183,6 +185,8 @@ def _shifts(data: TrainingSet, selection: Selection) -> tuple[np.ndarray, np.nda
 
 def curve_table(name: str, curve: Curve, choice: Rule = "simplest") -> pd.DataFrame:
     """The cross-validation curve, one row a grid point, for the report."""
+    import pandas as pd
+
     mean, deviation = curve.mean, curve.standard_error
     chosen = curve.choose(choice)
     rows = [

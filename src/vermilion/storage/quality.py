@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from vermilion.storage.tables import read_table, write_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = ("subject", "take", "stage", "frame", "valid", "reason")
 
@@ -45,12 +47,13 @@ def write_quality(
                 **row.figures,
             }
         )
-    table = pd.DataFrame(records) if records else pd.DataFrame(columns=list(COLUMNS))
-    write_table(path, table)
+    write_table(path, records, COLUMNS)
 
 
 def flagged_frames(paths: Iterable[str | Path]) -> pd.DataFrame:
     """Rows of many quality files that are invalid or warn, in order, the common columns only."""
+    import pandas as pd
+
     tables = [read_table(path, COLUMNS)[list(COLUMNS)] for path in paths]
     if not tables:
         return pd.DataFrame(columns=list(COLUMNS))

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import csv
+import math
+import numbers
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
+
+# pandas costs a quarter of a second: a job that only writes a few rows does without.
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: More columns than any tracker writes (OpenFace: 714). Ten thousands take a table's reader minutes.
 MOST_COLUMNS = 5000
@@ -18,11 +23,36 @@ MOST_COLUMNS = 5000
 _MOST_HEADER = 1 << 20
 
 
-def write_table(path: str | Path, rows: pd.DataFrame | Sequence[dict]) -> None:
-    """Write rows as TSV, whole or not at all; floats with 9 significant digits."""
-    table = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame(list(rows))
+def write_table(
+    path: str | Path,
+    rows: pd.DataFrame | Sequence[Mapping[str, object]],
+    columns: Sequence[str] = (),
+) -> None:
+    """Write rows as TSV, whole or not at all; floats with 9 significant digits, nothing for NaN.
+
+    Args:
+        path: of the file.
+        rows: a table, or a mapping a row, which may leave columns out.
+        columns: those that the header has before any other of the mappings.
+    """
     with atomic_path(path) as temporary:
-        table.to_csv(temporary, sep="\t", index=False, float_format="%.9g", na_rep="")
+        if hasattr(rows, "to_csv"):
+            rows.to_csv(temporary, sep="\t", index=False, float_format="%.9g", na_rep="")
+            return
+        names = list(dict.fromkeys([*columns, *(name for row in rows for name in row)]))
+        with open(temporary, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, delimiter="\t", lineterminator="\n")
+            writer.writerow(names)
+            writer.writerows([_cell(row.get(name)) for name in names] for row in rows)
+
+
+def _cell(value: object) -> object:
+    """What a table holds of a value."""
+    if value is None:
+        return ""
+    if isinstance(value, numbers.Real) and not isinstance(value, numbers.Integral):
+        return "" if math.isnan(value) else f"{float(value):.9g}"
+    return value
 
 
 def read_table(path: str | Path, columns: Sequence[str] = ()) -> pd.DataFrame:
@@ -49,6 +79,8 @@ def read_delimited(path: str | Path, separator: str, **options: object) -> pd.Da
     Raises:
         InputError: the file cannot be read, is no such table, or has a column twice or too many.
     """
+    import pandas as pd
+
     what = "a TSV with a header" if separator == "\t" else "a CSV with a header"
     try:
         names = _header(path, separator)

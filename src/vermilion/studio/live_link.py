@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from vermilion.storage.errors import InputError
 from vermilion.storage.tables import read_delimited, shortened
@@ -43,6 +42,8 @@ def read_live_link(
     Rows from `csv_first` on are used; an expression that the file lacks stays 0. Raises InputError
     where the file is no such table or has too few rows.
     """
+    import pandas as pd
+
     table = read_delimited(path, ",")
     columns = {
         arkit_name(column): table[column] for column in table.columns if column[:1].isalpha()

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 
 from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
@@ -92,6 +91,8 @@ def register_places(
     Returns:
         the places, and how far each point was moved onto the surface, (N,) mm; NaN where unknown.
     """
+    from scipy.interpolate import RBFInterpolator  # only sets other than ibug66 come here
+
     ids, wanted = landmark_set.ibug66, model.neutral_mm[model.landmarks]
     placed = similarity_alignment(shape[ids], wanted).apply(shape)
     lips = _lip_places(model, landmark_set, placed)
