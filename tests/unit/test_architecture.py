@@ -29,7 +29,7 @@ ORDER = [room for floor in FLOORS for room in floor]
 
 MODULE_LINES, FUNCTION_LINES, PARAMETERS = 300, 60, 9
 #: Compiled kernels: one loop over pixels or triangles with all its arrays as arguments.
-KERNELS = {("studio/kernels.py", "shade"), ("geometry/closest_points.py", "_closest_of")}
+KERNELS = {("studio/kernels.py", "shade"), ("geometry/closest_kernels.py", "closest_of")}
 
 #: Stage -> where its name differs, and why.
 PACKAGE_OF = {

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.unit.evaluation_face import sheet_face
 from tests.unit.test_integration import sheet
-from vermilion.geometry.closest_points import Surface, _closest_of, closest_barycentric
+from vermilion.geometry.closest_kernels import closest_of
+from vermilion.geometry.closest_points import Surface, closest_barycentric
 from vermilion.geometry.mesh import unique_edges, vertex_normals
 from vermilion.geometry.surface_points import SurfacePoints
 
@@ -128,9 +129,9 @@ def test_nearest_point_is_exact_on_a_mesh_with_very_long_triangles():
     surface = Surface(vertices, model.triangles)
     everything = np.tile(np.arange(len(surface.corners)), (len(points), 1))
     exact, none = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
-    _closest_of(
-        points, np.zeros_like(points), none, np.arange(len(points)), everything, surface.corners,
-        surface.normals, np.zeros(len(surface.corners), np.int64), -2.0, exact, none.copy(),
+    closest_of(
+        points, np.zeros_like(points), none, everything, surface.corners, surface.normals,
+        np.zeros(len(surface.corners), np.int64), -2.0, exact, none.copy(),
         np.zeros_like(points),
     )  # fmt: skip
     assert (found.distance_mm == exact).all()

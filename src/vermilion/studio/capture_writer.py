@@ -14,7 +14,6 @@ from vermilion.storage.arrays import write_array
 from vermilion.storage.files import write_text
 from vermilion.storage.progress import progress
 from vermilion.studio.labels import lip_contours, write_contours, write_landmarks
-from vermilion.studio.render import render
 from vermilion.studio.sensor import sensor_noise
 from vermilion.studio.surface import surface_of
 from vermilion.studio.take import StudioTakePlan
@@ -47,6 +46,8 @@ def write_images(
 
     `name` (subject/take) and `seed` decide the sensor's noise; `rays` are the renderer's counts.
     """
+    from vermilion.studio.render import render  # compiled: a quarter of a second
+
     surface = surface_of(plan.model)
     for frame in progress(list(frames), f"{name}: frames"):
         index = frame - first

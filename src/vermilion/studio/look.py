@@ -6,7 +6,6 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 NOISE_SIZE = 64
 
@@ -64,6 +63,8 @@ def look_of(seed: int, tattoo: bool) -> Look:
 @cache
 def noise_volume(seed: int = 20160) -> np.ndarray:
     """Smooth noise that tiles, (64, 64, 64) float32, deviation 1, blobs some four cells wide."""
+    from scipy.ndimage import gaussian_filter
+
     white = np.random.default_rng(seed).standard_normal((NOISE_SIZE,) * 3)
     smooth = gaussian_filter(white, 1.0, mode="wrap")
     return ((smooth - smooth.mean()) / smooth.std()).astype(np.float32)

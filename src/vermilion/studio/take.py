@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,9 +22,11 @@ from vermilion.studio.performance import (
     random_poses,
     start_at_neutral,
 )
-from vermilion.studio.render import Scene
 from vermilion.studio.surface import Surface
 from vermilion.studio.take_settings import TakeSettings
+
+if TYPE_CHECKING:
+    from vermilion.studio.render import Scene
 
 #: Largest turn of the heads of a `people` take: sideways, nodding, tilting (degrees).
 FREE_TURN_DEG = (24.0, 11.0, 7.0)
@@ -71,6 +74,8 @@ class StudioTakePlan:
 
     def scene(self, index: int, surface: Surface, **rays: int) -> Scene:
         """What the renderer needs of the index-th frame."""
+        from vermilion.studio.render import Scene
+
         return Scene(self.model.triangles, surface, self.look(index), self.light(index), **rays)
 
 
