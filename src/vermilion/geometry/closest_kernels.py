@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def closest_weights(  # pragma: no cover - compiled
     px: float, py: float, pz: float, abc: np.ndarray
 ) -> tuple[float, float, float]:
