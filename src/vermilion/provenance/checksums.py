@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import pandas as pd
-
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import sha256_of
 from vermilion.storage.tables import read_table, write_table
