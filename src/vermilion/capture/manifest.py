@@ -17,6 +17,7 @@ from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
 from vermilion.storage.errors import InputError, describe_problem
 from vermilion.storage.files import write_text
+from vermilion.storage.json_files import load_json
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow
 
@@ -56,7 +57,7 @@ class Manifest:
 def load_manifest(path: str | Path) -> Manifest:
     """Read what `Manifest.save` wrote. Raises InputError on another or damaged file."""
     try:
-        content = json.loads(Path(path).read_text())
+        content = load_json(path)
         version = content.pop("format_version")
         if version != FORMAT_VERSION:
             raise ValueError(f"format {version}")

@@ -11,6 +11,7 @@ import numpy as np
 
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import sha256_of, write_text
+from vermilion.storage.json_files import load_json
 
 if TYPE_CHECKING:
     from vermilion.imaging.video import VideoIndex
@@ -91,7 +92,7 @@ def video_facts(path: str | Path) -> VideoFacts:
 def load_video_facts(path: str | Path) -> VideoFacts:
     """Read what `VideoFacts.save` wrote. Raises InputError on another or damaged file."""
     try:
-        content = json.loads(Path(path).read_text())
+        content = load_json(path)
         version = content.pop("format_version")
         if version != FORMAT_VERSION:
             raise ValueError(f"format {version}")

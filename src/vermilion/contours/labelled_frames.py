@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.curves import outward_normals
-from vermilion.contours.labels import ContourLabel, label_paths, read_label
+from vermilion.contours.labels import ContourLabel, check_label, label_paths, read_label
 from vermilion.contours.ridges import blurred_colours
 from vermilion.contours.track_ridge import TrackRidgeDetector
 from vermilion.imaging.frames import FrameSource
@@ -69,6 +69,7 @@ def read_labelled(
         except InputError as error:
             left_out.append(QualityRow(frame, reason=f"label left out: unreadable: {error}"))
             continue
+        check_label(drawn, image.shape[1::-1], path, camera=camera, frame=frame, **place)
         points = landmarks.points_px[index[0]]
         labelled.append(LabelledFrame(image, points, drawn, frame))
     if required and not labelled:

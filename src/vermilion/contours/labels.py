@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from vermilion.contours.paths import cheapest_path
 from vermilion.geometry.polylines import evenly_along, lengths_along
+from vermilion.imaging.label_file import check_in_image, load_label, points_of
 from vermilion.imaging.sampling import sample_bilinear
 from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
@@ -45,26 +46,41 @@ class ContourLabel:
 def read_label(path: str | Path, **place) -> ContourLabel:
     """Read one `labels/contours/<camera>/<frame>.json`; raises InputError where it is not so."""
     try:
-        data = json.loads(Path(path).read_text())
-        lines = {}
-        for name in CONTOURS:
-            points = np.asarray(data[name]["points"], dtype=np.float64)
-            if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-                raise ValueError(f"{name}: points of shape {points.shape}")
-            if not np.isfinite(points).all():
-                raise ValueError(f"{name}: a point is not a number")
-            lines[name] = Polyline(points, bool(data[name].get("closed", True)))
-        if data.get("unit", "px") != "px":
-            raise ValueError(f"unit {data['unit']}")
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        data = load_label(Path(path))
+        lines = {name: _polyline(name, data.get(name)) for name in CONTOURS}
+    except (OSError, ValueError, OverflowError) as error:
         raise InputError(
-            f"an unusable contour label ({type(error).__name__}: {error})",
+            f"an unusable contour label ({error})",
             '{"unit": "px", "inner": {"closed": true, "points": [[x, y], ...]}, "outer": ...}',
             "Draw the contour again, or remove the file.",
             path=path,
             **place,
         ) from error
     return ContourLabel(**lines)
+
+
+def check_label(
+    label: ContourLabel, size_px: tuple[int, int], path: str | Path, **place: Any
+) -> None:
+    """Raise InputError where contours do not lie in their image of `size_px` (width, height)."""
+    for line in (label.inner, label.outer):
+        check_in_image(line.points_px, size_px, True, path, **place)
+
+
+def _polyline(name: str, data: object) -> Polyline:
+    """Raises ValueError where `data` is no contour."""
+    if not isinstance(data, dict):
+        raise ValueError(f"no contour '{name}'")
+    try:
+        points = points_of(data.get("points"))
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if len(points) < 2 or not np.ptp(points, axis=0).any():
+        raise ValueError(f"{name}: {len(points)} point(s) of no length")
+    closed = data.get("closed", True)
+    if not isinstance(closed, bool):
+        raise ValueError(f"{name}: closed is {closed!r:.20}, not true or false")
+    return Polyline(points, closed)
 
 
 def label_paths(capture: Source, camera: str) -> dict[int, Path]:

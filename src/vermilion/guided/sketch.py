@@ -24,6 +24,7 @@ import numpy as np
 from vermilion.guided.curves import first_self_crossing
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
+from vermilion.storage.json_files import load_json
 
 FORMAT, VERSION = "vermilion sketch", 1
 #: Curves a sketch may have. The inner ones are what hides the mouth, the outer ones the border of
@@ -107,9 +108,8 @@ def read_sketch(path: str | Path) -> Sketch:
         InputError: the file cannot be read or is no sketch; the message says which curve and point.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-        content = json.loads(text)
-    except (OSError, ValueError, RecursionError) as error:
+        content = load_json(path)
+    except (OSError, ValueError) as error:
         raise InputError(
             f"a file that is not JSON ({error})",
             "a sketch as docs/guided.md describes it",

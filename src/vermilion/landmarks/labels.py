@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from vermilion.imaging.label_file import check_in_image, load_label, points_of
 from vermilion.imaging.source import Source, folder_of
 from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
 from vermilion.storage.errors import InputError
@@ -16,11 +17,12 @@ from vermilion.storage.errors import InputError
 
 @dataclass(frozen=True)
 class LandmarkLabel:
-    """One labelled image: camera, frame, points (66, 2) in pixels."""
+    """One labelled image: camera, frame, points (66, 2) in pixels, the file they come from."""
 
     camera: str
     frame: int
     points_px: np.ndarray
+    path: Path | None = None
 
 
 def label_files(capture: Source) -> list[Path]:
@@ -32,10 +34,9 @@ def read_label(path: str | Path) -> LandmarkLabel:
     """Read one file of 66 points (or 68, whose inner mouth corners are left out)."""
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        points = np.asarray(content["points"], dtype=np.float64)
+        points = points_of(load_label(path).get("points"))
         frame = int(path.stem)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, OverflowError) as error:
         raise InputError(
             f"an unreadable landmark label ({error})",
             '{"unit": "px", "image": ..., "points": [[x, y] * 66]} in a file named by its frame',
@@ -44,7 +45,7 @@ def read_label(path: str | Path) -> LandmarkLabel:
         ) from error
     if points.shape == (68, 2):
         points = points[FROM_68]
-    if points.shape != (N_LANDMARKS, 2) or not np.isfinite(points).all():
+    if points.shape != (N_LANDMARKS, 2):
         raise InputError(
             f"points of shape {points.shape}",
             "66 finite points (x, y) in pixels",
@@ -53,7 +54,7 @@ def read_label(path: str | Path) -> LandmarkLabel:
             frame=frame,
             path=path,
         )
-    return LandmarkLabel(path.parent.name, frame, points)
+    return LandmarkLabel(path.parent.name, frame, points, path)
 
 
 def read_labels(capture: Source) -> Iterator[LandmarkLabel]:
@@ -62,6 +63,20 @@ def read_labels(capture: Source) -> Iterator[LandmarkLabel]:
         yield read_label(path)
 
 
-def labels_by_frame(paths: Iterable[str | Path]) -> dict[int, np.ndarray]:
-    """Points (66, 2) px of the label files of one camera, by frame number."""
-    return {label.frame: label.points_px for label in map(read_label, paths)}
+def check_label(label: LandmarkLabel, size_px: tuple[int, int], **place: Any) -> None:
+    """Raise InputError where a label does not lie in its image of `size_px` (width, height)."""
+    named = {"camera": label.camera, "frame": label.frame}
+    check_in_image(label.points_px, size_px, False, label.path, **named, **place)
+
+
+def labels_by_frame(
+    paths: Iterable[str | Path], size_px: tuple[int, int], **place: Any
+) -> dict[int, np.ndarray]:
+    """Points (66, 2) px of the label files of one camera, by frame number.
+
+    Raises InputError where a file is damaged, or its points do not lie in images of `size_px`.
+    """
+    labels = [read_label(path) for path in paths]
+    for label in labels:
+        check_label(label, size_px, **place)
+    return {label.frame: label.points_px for label in labels}

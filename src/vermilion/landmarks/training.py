@@ -16,7 +16,7 @@ from vermilion.landmarks.descent import (
     stage_sizes,
 )
 from vermilion.landmarks.gradients import grey_of
-from vermilion.landmarks.labels import LandmarkLabel
+from vermilion.landmarks.labels import LandmarkLabel, check_label
 from vermilion.landmarks.locate import train_locator
 from vermilion.landmarks.scheme import MIRROR, N_LANDMARKS, face_size_px
 from vermilion.storage.errors import InputError
@@ -59,7 +59,9 @@ def labelled_images(
     images, points = [], []
     for index in chosen:
         source, label = labels[index]
-        images.append(source.read(label.camera, label.frame))
+        image = source.read(label.camera, label.frame)
+        check_label(label, image.shape[1::-1])
+        images.append(image)
         points.append(label.points_px)
     return images, np.array(points)
 

@@ -22,7 +22,13 @@ def main(snakemake):
     for path in snakemake.input.csv:
         found = read_landmark_csv(**{**cfg["csv"], "path": path}).by_frame
         given |= {frame: entry.points_px for frame, entry in found.items()}
-    given |= labels_by_frame(snakemake.input.labels)  # a person is right where both speak
+    drawn = labels_by_frame(
+        snakemake.input.labels,
+        source.size(camera),
+        subject=snakemake.wildcards.subject,
+        take=snakemake.wildcards.take,
+    )
+    given |= drawn  # a person is right where both speak
     track = without_offset(track, given)
 
     def read_grey(frame):
