@@ -18,10 +18,10 @@ from snakemake.exceptions import WorkflowError
 from snakemake.settings.types import ExecMode
 
 from vermilion.config.external_base import sequences_of
-from vermilion.config.load import load_configuration
+from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
-from vermilion.storage.errors import ConfigurationError, VermilionError
+from vermilion.storage.errors import VermilionError
 from vermilion.config.regressors import (
     regressors_of,
     regressors_of_study,
@@ -42,8 +42,10 @@ IS_MAIN_PROCESS = workflow.exec_mode == ExecMode.DEFAULT
 ORIGIN = ", ".join(str(path) for path in workflow.configfiles)
 
 try:
+    if IS_MAIN_PROCESS:  # Snakemake reads them, but takes the last of two equal keys
+        _ = [read_keys(path) for path in workflow.configfiles]
     CONFIG, TAKES = load_configuration(config, ORIGIN, check_disk=IS_MAIN_PROCESS)
-except ConfigurationError as error:
+except VermilionError as error:
     raise WorkflowError(str(error)) from None
 SKIPPED = [take for take in TAKES if take.name in CONFIG.skip_takes]
 CONFIG, TAKES = without_skipped(CONFIG, TAKES)

@@ -11,9 +11,9 @@ Section = TypeVar("Section", bound="StageConfig")
 
 
 class StageConfig(BaseModel):
-    """A section: unknown keys are errors, values cannot be changed once read."""
+    """A section: unknown keys and numbers that are not finite are errors, values cannot be changed once read."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def section(kind: Callable[..., Section], description: str) -> Section:

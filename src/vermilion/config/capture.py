@@ -29,7 +29,7 @@ class CalibrationConfig(StageConfig):
     squares: tuple[int, int] = Field(
         (9, 7), description="Squares of the board in a row and in a column (count)."
     )
-    square_mm: float = Field(20.0, gt=0, le=1000, description="Edge of a square (mm).")
+    square_mm: float = Field(20.0, ge=0.5, le=1000, description="Edge of a square (mm).")
     marker_mm: float = Field(
         15.0, gt=0, le=1000, description="Edge of a marker, ChArUco only (mm); less than a square."
     )

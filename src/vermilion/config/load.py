@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import reprlib
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
@@ -18,6 +18,7 @@ from vermilion.config.external_base import (
 from vermilion.config.moved import earlier_key, earlier_keys
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
+from vermilion.config.yaml_file import read_yaml
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import AS_TAGGED, IMAGE_SUFFIXES, ImageReading, refusal
 from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
@@ -43,7 +44,7 @@ def load_configuration(
     ]
     configuration = None
     try:
-        configuration = Configuration(**raw)
+        configuration = Configuration.model_validate(raw)
     except ValidationError as error:
         # A key of an earlier version is unknown as well: it is named once.
         unknown = [item for item in error.errors() if not (problems and _is_earlier(item))]
@@ -70,15 +71,7 @@ def read_keys(path: str | Path) -> dict[str, Any]:
     Raises:
         InputError: the file cannot be read, is no YAML, or holds no keys.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8")) or {}
-    except (OSError, yaml.YAMLError) as error:
-        raise InputError(
-            f"no readable configuration ({error})",
-            "a YAML file",
-            "Correct the path (CONFIG=config/yours.yaml) or the file.",
-            path=path,
-        ) from error
+    content = read_yaml(path) or {}
     if not isinstance(content, dict):
         raise InputError(
             f"a {type(content).__name__}", "keys and values", "See config/README.md.", path=path
@@ -175,4 +168,4 @@ def _sentence(origin: str, item: ErrorDetails) -> str:
         )
     if item["type"] == "missing":
         return f"{origin}, key {key}: found nothing; expected a value. Add the key."
-    return f"{origin}, key {key}: found {found!r}; expected: {item['msg']}."
+    return f"{origin}, key {key}: found {reprlib.repr(found)}; expected: {item['msg']}."

@@ -92,9 +92,9 @@ def read_takes(path: str | Path) -> tuple[list[Take], list[str]]:
     path = Path(path)
     try:
         rows, problems = read_cells(path)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         return [], [
-            f"{path}: found no readable take sheet ({error.strerror}); expected a TSV with "
+            f"{path}: found no readable take sheet ({getattr(error, 'strerror', error)}); expected a TSV with "
             f"columns {' '.join(COLUMNS)}. Create it or correct the key `takes`."
         ]
     if problems:

@@ -54,7 +54,11 @@ def points_of(values: object) -> np.ndarray:
 
 
 def check_in_image(
-    points_px: np.ndarray, size_px: tuple[int, int], whole: bool, path: str | Path | None, **place: Any
+    points_px: np.ndarray,
+    size_px: tuple[int, int],
+    whole: bool,
+    path: str | Path | None,
+    **place: Any,
 ) -> None:
     """Raise InputError where points (n, 2) do not lie in an image of `size_px` (width, height).
 
