@@ -15,7 +15,7 @@ _MOST_BYTES = 1_000_000
 _MOST_VALUES = 100_000
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """SafeLoader that refuses a key which stands twice in one section."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
