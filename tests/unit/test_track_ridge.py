@@ -107,7 +107,7 @@ def test_what_is_nearly_black_between_lips_is_a_hole_and_no_contact(detector, da
     planes = [plane.astype(np.float32) for plane in (lightness, lightness, lip, lip)]
     curve = ellipse(CENTRE, 0.75 * WIDTH, 0.01, 80)
     points = curve[:, None] + np.array([0.0, 1.0]) * np.arange(-9, 10)[:, None]
-    contact = detector._contact(curve, points, InnerCues(*planes))
+    contact = detector._contact(curve, points, InnerCues(*planes, np.zeros_like(planes[0])))
     np.testing.assert_allclose(contact, touching, atol=0.01)
 
 

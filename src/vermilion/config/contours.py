@@ -127,6 +127,13 @@ class ContourDetectorConfig(StageConfig):
         "the inner border is looked for (per inter-ocular distance). Where there are such lips, both start "
         "from them, and `ridge_reach` and `track.inner_reach` do not count.",
     )
+    lips_shade: float = Field(
+        0.7,
+        ge=0,
+        le=2,
+        description="Where the lips of dense landmarks are the start: what the dark line between a lip and "
+        "the teeth counts as an edge (share of the strongest).",
+    )
     edge_weight: float = Field(
         4.0,
         ge=0,

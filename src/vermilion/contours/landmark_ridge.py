@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.contours.curves import filled, loop_spline
-from vermilion.contours.lip_planes import dark_lines, lip_planes
+from vermilion.contours.lip_planes import lip_planes
 from vermilion.contours.region import MouthRegion
-from vermilion.contours.ridges import SEARCHES, InnerCues, RidgeDetector, blurred_colours
+from vermilion.contours.ridges import SEARCHES, RidgeDetector, blurred_colours, cues_of
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,6 @@ class LandmarkRidgeDetector(RidgeDetector):
         colours = blurred_colours(image)
         landmarks = {"inner": loop_spline(region.inner_px), "outer": loop_spline(region.outer_px)}
         reach = self.reach * self.interocular_size_px
-        contact = dark_lines(colours[0])
         curves, strengths = dict(landmarks), {}
         for search in SEARCHES:
             planes = lip_planes(colours, curves, search.band, search.tolerance, search.beside)
@@ -36,11 +35,14 @@ class LandmarkRidgeDetector(RidgeDetector):
                 curves["outer"], planes["outer"], search.outer_reach * reach, search.step_px
             )
             lip = filled(curves["outer"], region.size_px).astype(np.float32)
+            cues = cues_of(colours, planes["flesh"], lip)
+            if search is SEARCHES[0]:
+                landmarks["inner"] = self.to_holes(landmarks["inner"], cues, search.step_px)
             curves["inner"], strengths["inner"] = self.fit_border(
                 curves["inner"] if search.inner_reach < 1 else landmarks["inner"],
                 planes["inner"],
                 search.inner_reach * reach,
                 search.step_px,
-                InnerCues(colours[0], contact, planes["flesh"], lip),
+                cues,
             )
         return {name: self.ridge(curves[name], strengths[name], region) for name in curves}

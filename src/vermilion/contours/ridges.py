@@ -14,9 +14,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.channels import image_channels
-from vermilion.contours.curves import distance_across, outward_normals, sampled, smoothed_ring
+from vermilion.contours.curves import (
+    distance_across,
+    filled,
+    outward_normals,
+    sampled,
+    smoothed_ring,
+)
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.gums import creases
+from vermilion.contours.holes import hole_edges
+from vermilion.contours.lip_planes import dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion
 
@@ -24,6 +32,12 @@ BLUR_PX = 1.0  # of the colours
 CONTACT = 0.03  # a mouth open by less may be closed: per inter-ocular distance
 #: An opening is a hole: so dark between the lips, per their lightness, is one; above, shade of a contact.
 HOLE = (0.2, 0.4)
+#: A hole's edge is looked for so far inside and outside the start, per inter-ocular distance.
+HOLE_REACH = (0.15, 0.03)
+HOLE_PX = 2.0  # deviation of its place
+HOLE_STIFFNESS = 1.0  # as `stiffness`: a rounded mouth has another shape than the network's
+TEETH = 1.1  # lightness of teeth per the lips'
+TEETH_PX = 6  # so near to them the dark line of a lip's shade is its border
 LINE_SHARE = 0.7  # what the dark line counts there, against the fall
 
 
@@ -69,12 +83,14 @@ class InnerCues:
         contact: dark lines, as where lips touch.
         flesh: where the image is lips, gums or tongue, 0 or 1.
         lip: 1 inside the outer border.
+        teeth: 1 on and just beside teeth: light places without the lips' colour.
     """
 
     lightness: np.ndarray
     contact: np.ndarray
     flesh: np.ndarray
     lip: np.ndarray
+    teeth: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -89,6 +105,7 @@ class RidgeDetector(ContourDetector):
             distance.
         edge_weight: what the strongest edge is worth against the start; 0: the start alone.
         stiffness: cost of a slope of 1 of the moved ring against the start, squared.
+        lips_shade: what the dark line beside teeth counts, as an edge: a real lip ends in its own shade there.
     """
 
     takes_rings = True
@@ -99,6 +116,7 @@ class RidgeDetector(ContourDetector):
     reach: float = 0.08
     edge_weight: float = 4.0
     stiffness: float = 6.0
+    lips_shade: float = 0.7
 
     @classmethod
     def of(cls, section, reach: float, **others: float) -> Self:
@@ -143,6 +161,8 @@ class RidgeDetector(ContourDetector):
             line = sampled(inside.contact, points)
             line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
             fall += LINE_SHARE * near * (line - fall)
+            if self.lips_shade:
+                fall += self.lips_shade * (1 - near) * line * sampled(inside.teeth, points)
             crease, beyond = self._creases(curve, normals, inside, step_px, count)
             fall += (1.0 - near) * (crease - beyond * fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
@@ -150,6 +170,28 @@ class RidgeDetector(ContourDetector):
         rows = np.arange(len(curve))
         found = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
         return found, np.minimum(fall[rows, chosen], 1.0)
+
+    def to_holes(self, curve: np.ndarray, inside: InnerCues, step_px: float) -> np.ndarray:
+        """The inner border's `curve` (n, 2) moved to the edge of the dark beside the lips, where there is one."""
+        size, normals = self.interocular_size_px, outward_normals(curve)
+        inwards, outwards = (int(share * size / step_px) for share in HOLE_REACH)
+        places = step_px * np.arange(-inwards, outwards + 1)
+        points = curve[:, None] + places[None, :, None] * normals[:, None]
+        lightness, flesh, lip = (
+            sampled(plane, points) for plane in (inside.lightness, inside.flesh, inside.lip)
+        )
+        at, sure = hole_edges(lightness, flesh > 0.5, lip > 0.5, places)
+        line = sure[:, None] * np.exp(-0.5 * ((places[None] - places[at][:, None]) / HOLE_PX) ** 2)
+        far = (places / (HOLE_REACH[0] * size)) ** 2
+        cost = (
+            far
+            + (1 - sure[:, None]) * (places / (self.reach * size)) ** 2
+            - self.edge_weight * line
+        )
+        across = np.maximum(distance_across(curve), self.reach * size)
+        cost[-places[None] > across[:, None]] = 1e3
+        chosen = cheapest_ring(cost, step_cost(curve, step_px, HOLE_STIFFNESS))
+        return smoothed_ring(curve + places[chosen][:, None] * normals, 2)
 
     def _contact(self, curve: np.ndarray, points: np.ndarray, inside: InnerCues) -> np.ndarray:
         """How far (n,) lips may touch at a curve (n, 2), whose normals' places are (n, T, 2)."""
@@ -205,3 +247,26 @@ def blurred_colours(image: np.ndarray) -> np.ndarray:
     """Colour channels (3, h, w) of an image (h, w, 3), a little blurred."""
     colours = image_channels(image)[:3]
     return np.stack([cv2.GaussianBlur(plane, (0, 0), BLUR_PX) for plane in colours])
+
+
+def inner_cues(
+    colours: np.ndarray, outer: np.ndarray, inner: np.ndarray, search: Search
+) -> tuple[InnerCues, np.ndarray]:
+    """What tells the inner border in `colours` (3, size, size), and the plane (size, size) of what is not lip.
+
+    The borders are thought to be `outer` and `inner` (n, 2) px.
+    """
+    planes = lip_planes(colours, {"outer": outer, "inner": inner}, search.band, search.tolerance)
+    lip = filled(outer, colours.shape[1]).astype(np.float32)
+    return cues_of(colours, planes["flesh"], lip), planes["inner"]
+
+
+def cues_of(colours: np.ndarray, flesh: np.ndarray, lip: np.ndarray) -> InnerCues:
+    """`InnerCues` of `colours` (3, size, size), with the planes `flesh` and `lip` (size, size)."""
+    seen = (lip > 0.5) & (flesh > 0.5)
+    usual = np.median(colours[0][seen]) if seen.any() else 1.0
+    teeth = ((flesh < 0.5) & (lip > 0.5) & (colours[0] > TEETH * usual)).astype(np.uint8)
+    teeth = cv2.morphologyEx(teeth, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    reach = 2 * TEETH_PX + 1
+    beside = cv2.dilate(teeth, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
+    return InnerCues(colours[0], dark_lines(colours[0]), flesh, lip, beside.astype(np.float32))

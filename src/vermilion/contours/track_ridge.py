@@ -17,7 +17,6 @@ from scipy.ndimage import gaussian_filter1d
 
 from vermilion.contours.curves import (
     CURVE_POINTS,
-    filled,
     loop_spline,
     outward_normals,
     sampled,
@@ -25,10 +24,10 @@ from vermilion.contours.curves import (
     smoothed_ring,
     without_crossing,
 )
-from vermilion.contours.lip_planes import BESIDE, dark_lines, lip_planes
+from vermilion.contours.lip_planes import BESIDE
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
-from vermilion.contours.ridges import SEARCHES, InnerCues, RidgeDetector, blurred_colours
+from vermilion.contours.ridges import SEARCHES, RidgeDetector, blurred_colours, inner_cues
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
 
@@ -131,17 +130,18 @@ class TrackRidgeDetector(RidgeDetector):
         curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
             curve
         )
-        lip, contact = filled(outer, region.size_px).astype(np.float32), dark_lines(colours[0])
         start, strength = curve, np.zeros(len(curve))
         for search in SEARCHES:
-            curves = {"outer": outer, "inner": curve}
-            planes = lip_planes(colours, curves, search.band, search.tolerance)
+            cues, strange = inner_cues(colours, outer, curve, search)
+            if search is SEARCHES[0]:
+                start = curve = self.to_holes(curve, cues, search.step_px)
+                cues, strange = inner_cues(colours, outer, curve, search)
             curve, strength = self.fit_border(
                 curve if search.inner_reach < 1 else start,
-                planes["inner"],
+                strange,
                 search.inner_reach * reach,
                 search.step_px,
-                InnerCues(colours[0], contact, planes["flesh"], lip),
+                cues,
             )
         return without_crossing(curve), strength
 

@@ -43,8 +43,9 @@ def from_track(cfg, camera, source, track, rings, dense):
     inner_reach = cfg.lips_reach if dense else options.inner_reach
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector.of(
-        cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach
-    )
+        cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach,
+        lips_shade=cfg.lips_shade if dense else 0.0,
+    )  # fmt: skip
     return learn_from_take(
         detector,
         sorted(evenly(rings.frames, options.frames)),
@@ -81,8 +82,8 @@ def main(snakemake) -> None:
     if labelled:
         detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
     else:
-        reach = cfg.lips_reach if dense else cfg.ridge_reach
-        detector = by_track or LandmarkRidgeDetector.of(cfg, reach)
+        reach, shade = (cfg.lips_reach, cfg.lips_shade) if dense else (cfg.ridge_reach, 0.0)
+        detector = by_track or LandmarkRidgeDetector.of(cfg, reach, lips_shade=shade)
     detector.save(snakemake.output.detector)
     rows.sort(key=lambda row: row.frame)
     write_quality(snakemake.output.quality, subject, take, "contour labels", rows)
