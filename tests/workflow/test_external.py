@@ -1,13 +1,27 @@
 """Another tracker's sequences as the base: its jobs take the place of our tracker's, the rest is the same."""
 
 import json
+import shutil
 
+import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from benchmarks.foreign_tracker import ForeignTracker, write_objs
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.external.read import read_tracked
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.camera import read_cameras
+from vermilion.storage.tables import read_table
+
+from .conftest import Project
 from .test_graph import jobs_of
 
 pytestmark = pytest.mark.slow
 
+TAKES = (("s1", "rom"), ("s1", "phone"), ("s2", "rom"))
+#: A frame of the shot that the sequence has not.
+LOST = 5
 #: Jobs of our own tracker.
 OURS = {
     "identity", "image_identity", "tracking", "appearance", "image_fit", "image_fit_join", "offsets",
@@ -29,7 +43,7 @@ def jobs(project, *, of, **tracking):
     """Rule, inputs and outputs of the jobs of the tiny capture with three sequences."""
     sheet = (project.folder / "config/takes.tiny.tsv").read_text().splitlines()
     rows = [sheet[0] + "\tof", *(line + "\t" for line in sheet[1:])]
-    for subject, take in (("s1", "rom"), ("s1", "phone"), ("s2", "rom")):
+    for subject, take in TAKES:
         source = project.folder / f"tracks/{subject}_{take}"
         source.mkdir(parents=True, exist_ok=True)
         (source / "0000.obj").touch()
@@ -79,3 +93,66 @@ def test_weights_and_a_model_of_another_run_are_inputs(fresh_project):
     found = jobs(fresh_project, of=True, external={"base": {"model": "other.npz"}})
     assert not {"external_topology", "external_model"} & {name for name, _, _ in found}
     assert all("other.npz" in given for name, given, _ in found if name == "features")
+
+
+@pytest.fixture(scope="module")
+def corrected(finished, tmp_path_factory):
+    """The finished tiny capture, run again with a simulated tracker's sequences as its base."""
+    folder = tmp_path_factory.mktemp("external") / "project"
+    shutil.copytree(finished.folder, folder, symlinks=True)
+    project = Project(folder, finished.configuration)
+    results, sheet = project.results, folder / "config/takes.external.tsv"
+    studio = FaceModel.load(folder / "results/external/face_model/studio.npz")
+    tracker, meshes = ForeignTracker.of(studio, 6000), {}
+    rows = [line + "\t" for line in sheet.read_text().splitlines()]
+    rows[0] += "of"
+    for subject, take in TAKES:
+        truth = folder / "truth" / subject / take
+        cameras = read_cameras(results / "takes" / subject / take / "cameras")
+        camera = cameras.get("face2") or next(iter(cameras.values()))
+        meshes[subject, take], _, _ = tracker.track(
+            np.load(truth / "vertices_mm.npy"), np.load(truth / "neutral_mm.npy"), camera,
+            len(take), int(subject[1:]),
+        )  # fmt: skip
+        source = f"tracks/{subject}_{take}"
+        write_objs(folder / source, meshes[subject, take], tracker.triangles, 0)
+        rows.append(
+            "\t".join([subject, f"{take}_ft", "tracked", source, "", "", "30", "none", take])
+        )
+    (folder / "tracks/s1_phone" / f"head.{LOST:04d}.obj").unlink()
+    sheet.write_text("\n".join(rows) + "\n")
+    project.edit_configuration(
+        lambda content: content["apply"].update(export={"formats": ["usd", "obj"]})
+    )
+    wanted = ["results/external/apply/s1/phone/corrected.npy"]
+    project.snakemake("--rerun-triggers", "mtime", "--forcerun", *ADDED, "--", *wanted)
+    return project, tracker, meshes["s1", "phone"]
+
+
+def test_a_shot_comes_out_on_its_own_topology_world_and_unit(corrected):
+    project, tracker, meshes = corrected
+    out = project.results / "apply/s1/phone"
+    frames = [frame for frame in range(len(meshes)) if frame != LOST]
+    model = FaceModel.load(project.results / "face_model/external.npz")
+    correspondence = Correspondence.load(project.results / "subjects/s1/correspondence.npz")
+    mask = np.zeros(model.n_vertices, dtype=bool)
+    mask[model.triangles[correspondence.mask]] = True
+    to_mask = cKDTree(model.neutral_mm[mask]).query(model.neutral_mm)[0]
+    away = to_mask > 40.0  # mm, beyond the seam
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+    assert away.sum() > 300 and lips.sum() > 100
+    for file in ("obj", "corrected.usdc"):
+        back = read_tracked(out / file, frames, 1000.0)
+        assert np.array_equal(back.triangles, tracker.triangles)
+        moved = np.linalg.norm(back.vertices_mm / 1000.0 - meshes[frames], axis=2)
+        assert moved[:, away].max() < 1e-4, file  # metres; it is 1e-7
+        assert moved[:, lips].max() > 5e-4, file
+
+
+def test_the_frame_that_the_sequence_lost_is_named(corrected):
+    project, _, _ = corrected
+    rows = read_table(project.results / "takes/s1/phone/tracking/quality/000000-000007.tsv")
+    assert rows["frame"][rows["valid"] == 0].tolist() == [LOST]
+    assert "not in s1_phone; export this frame again" in rows["reason"][LOST]
+    log = (project.results / "logs/external_fit/s1-phone.log").read_text()
+    assert "world of the sequence: its own, found by the landmarks" in log

@@ -236,6 +236,8 @@ if EXTERNAL:
             P.log("external_fit", "take"),
         benchmark:
             P.benchmark("external_fit", "take")
+        wildcard_constraints:
+            take=one_of(_TAKES[name].take for name in EXTERNAL),
         resources:
             mem_mb=growing(1500, for_each_frame=2),
             runtime=growing(30),
@@ -265,6 +267,8 @@ if EXTERNAL:
             P.log("external_meshes", "chunk"),
         benchmark:
             P.benchmark("external_meshes", "chunk")
+        wildcard_constraints:
+            take=one_of(_TAKES[name].take for name in EXTERNAL),
         resources:
             mem_mb=growing(1500),
             runtime=growing(60),
