@@ -87,5 +87,9 @@ def test_a_take_is_left_out_with_its_sequence(tmp_path):
 
 def test_a_sequence_that_is_not_there_is_named_before_any_job(tmp_path):
     path = sheet(tmp_path, *CAPTURE, *SEQUENCES)
-    with pytest.raises(ConfigurationError, match="s/rom_ft: source: found no 't/rom'"):
-        load_configuration({"takes": str(path)}, "mine.yaml")
+    base = {"weights": "w/{subject}_{of}.csv", "model": "other.npz"}
+    raw = {"takes": str(path), "tracking": {"external": {"base": base}}}
+    with pytest.raises(ConfigurationError, match="s/rom_ft: source: found no 't/rom'") as error:
+        load_configuration(raw, "mine.yaml")
+    for words in ("base.weights: found no 'w/s_rom.csv'", "base.model: found no 'other.npz'"):
+        assert f"mine.yaml, key tracking.external.{words}" in str(error.value)

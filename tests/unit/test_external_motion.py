@@ -9,6 +9,7 @@ from tests.unit.test_tracking_motion import true_motion
 from vermilion.external.motion import external_take, placed_meshes
 from vermilion.external.origin import Origin
 from vermilion.external.placement import Placement, place_world
+from vermilion.external.read import read_tracked
 from vermilion.external.weights_file import read_weights
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.geometry.polygons import Polygons
@@ -121,6 +122,18 @@ def test_meshes_go_back_to_the_files_frame_and_unit(tmp_path, turned, unit_mm):
     origin = Origin.load(tmp_path / "o.npz")
     assert np.allclose(origin.in_file(read), in_file, atol=1e-12)
     assert origin.polygons.counts.tolist() == [4] and origin.first == 3
+
+
+@pytest.mark.parametrize("up", [None, "y", "z"])
+def test_what_is_read_goes_back_as_it_was(tmp_path, up):
+    vertices = 0.1 * np.random.default_rng(2).normal(size=(2, 9, 3))
+    np.savez(tmp_path / "s.npz", vertices=vertices, triangles=np.array([[0, 1, 2]]))
+    found = read_tracked(tmp_path / "s.npz", [0, 1], 1000.0, up=up)
+    origin = Origin(found.unit_mm, found.up, found.turned, found.polygons, 0)
+    assert found.turned == (up == "z") and found.up == (up or "y")
+    assert np.abs(origin.in_file(found.vertices_mm) - vertices).max() < 1e-7
+    # A sculpt in the file's axes, mm, comes to where the sequence is.
+    assert np.allclose(origin.upright(1000.0 * vertices), found.vertices_mm, atol=1e-3)
 
 
 def test_weights_are_read_by_frame_and_what_is_wrong_is_named(tmp_path):

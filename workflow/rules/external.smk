@@ -5,6 +5,8 @@ Reading: takes/{subject}/{take}/tracking/ of the sequence's own row. As the base
 fit.npz and C as our tracker writes, of that take.
 """
 
+from vermilion.config.external_base import weights_path
+
 SEQUENCE_KEYS = ("tracking.external.unit_mm", "tracking.external.up", "tracking.external.mesh")
 
 
@@ -57,8 +59,8 @@ def space_takes():
 
 def sequence_weights(take):
     """The CSV of blend weights of the base of a take; none where the tracker gives none."""
-    pattern, row = CONFIG.tracking.external.base.weights, sequence_of(take)
-    return [pattern.format(subject=row.subject, take=row.take, of=row.of)] if pattern else []
+    path = weights_path(CONFIG, sequence_of(take))
+    return [path] if path else []
 
 
 def sequence_place(take):

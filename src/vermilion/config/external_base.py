@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take
@@ -91,6 +92,26 @@ def external_checks(configuration: Configuration, takes: Sequence[Take]) -> Iter
                 f"{key}: found {used}; expected nothing, since the base is a sequence of another "
                 "tracker, and this stage needs our own face model's."
             )
+
+
+def weights_path(configuration: Configuration, sequence: Take) -> str | None:
+    """The CSV of blend weights of a sequence; None where the tracker gives none."""
+    pattern = configuration.tracking.external.base.weights
+    return pattern and pattern.format(subject=sequence.subject, take=sequence.take, of=sequence.of)
+
+
+def missing_files(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
+    """A sentence for each file of the base that the configuration names and that is not there."""
+    base, sequences = configuration.tracking.external.base, sequences_of(takes)
+    named = {"landmarks": [base.landmarks], "model": [base.model]}
+    named["weights"] = [weights_path(configuration, row) for row in sequences.values()]
+    for key, paths in named.items():
+        for path in paths if sequences else []:
+            if path and not Path(path).is_file():
+                yield (
+                    f"tracking.external.base.{key}: found no '{path}'; expected a file. Correct the path "
+                    "(relative to the folder where the workflow starts)."
+                )
 
 
 def with_external_base(configuration: Configuration, takes: Sequence[Take]) -> Configuration:

@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from vermilion.config.cross_checks import cross_checks
 from vermilion.config.external_base import (
     external_problems,
+    missing_files,
     with_external_base,
     with_frames_of_images,
 )
@@ -55,6 +56,9 @@ def load_configuration(
     takes = with_frames_of_images(takes)
     if configuration is not None:
         problems += [f"{origin}, key {problem}" for problem in cross_checks(configuration, takes)]
+    if check_disk and configuration is not None:
+        files = missing_files(configuration, takes)
+        problems += [f"{origin}, key {problem}" for problem in files]
     if check_disk:
         reading = AS_TAGGED if configuration is None else configuration.capture.reading
         for take in takes:
