@@ -148,5 +148,5 @@ def test_weights_are_read_by_frame_and_what_is_wrong_is_named(tmp_path):
     path.write_text("smile\n0.5\n")
     with pytest.raises(InputError, match="without frame"):
         read_weights(path, [4])
-    with pytest.raises(InputError, match="no readable CSV"):
+    with pytest.raises(InputError, match="unreadable table"):
         read_weights(tmp_path / "gone.csv", [4])

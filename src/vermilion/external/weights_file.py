@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from vermilion.storage.errors import InputError
+from vermilion.storage.tables import read_delimited
 
 #: Columns that are no weights.
 _OTHER = ("frame", "time_s", "valid")
@@ -35,12 +35,7 @@ def read_weights(
             values that are no numbers.
     """
     hint = "See docs/other_trackers.md, or correct tracking.external.base.weights."
-    try:
-        table = pd.read_csv(path, skipinitialspace=True)
-    except (OSError, ValueError, pd.errors.ParserError) as error:
-        raise InputError(
-            f"no readable CSV ({error})", "the blend weights of the take", hint, path=path, **place
-        ) from error
+    table = read_delimited(path, ",", skipinitialspace=True, place=place)
     known = [str(name) for name in table.columns if name not in _OTHER]
     asked = known if names is None else list(names)
     missing = [name for name in ["frame", *asked] if name not in table.columns]
@@ -50,8 +45,12 @@ def read_weights(
             "`frame` and one a blend shape, the same in all takes", hint, path=path, **place,
         )  # fmt: skip
     try:
-        numbers = table["frame"].to_numpy(dtype=np.int64)
+        numbers = table["frame"].to_numpy(dtype=np.float64)
         values = table[asked].to_numpy(dtype=np.float64)
+        if not np.isfinite(numbers).all() or np.isinf(values).any():
+            raise ValueError("a frame without a number, or an infinite weight")
+        if len(set(numbers)) < len(numbers):
+            raise ValueError("two rows of one frame")
     except ValueError as error:
         raise InputError(
             f"values that are no numbers ({error})", "numbers", hint, path=path, **place

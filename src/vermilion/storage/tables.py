@@ -69,11 +69,14 @@ def read_table(path: str | Path, columns: Sequence[str] = ()) -> pd.DataFrame:
     return table
 
 
-def read_delimited(path: str | Path, separator: str, **options: object) -> pd.DataFrame:
+def read_delimited(
+    path: str | Path, separator: str, place: Mapping[str, object] | None = None, **options: object
+) -> pd.DataFrame:
     """A table of another program: one header line, UTF-8 with a byte order mark or without.
 
     Args:
         separator: between cells, `,` or a tab.
+        place: subject and take, for messages.
         options: of pandas' `read_csv`.
 
     Raises:
@@ -88,7 +91,11 @@ def read_delimited(path: str | Path, separator: str, **options: object) -> pd.Da
         if len(names) > MOST_COLUMNS or twice:
             found = f"{len(names)} columns" if not twice else f"the column '{twice[0]}' twice"
             raise InputError(
-                found, f"at most {MOST_COLUMNS} columns, each once", "Check the file.", path=path
+                found,
+                f"at most {MOST_COLUMNS} columns, each once",
+                "Check the file.",
+                path=path,
+                **(place or {}),
             )
         return pd.read_csv(path, sep=separator, encoding="utf-8-sig", **options)
     except (OSError, ValueError, csv.Error, MemoryError, OverflowError) as error:
@@ -97,6 +104,7 @@ def read_delimited(path: str | Path, separator: str, **options: object) -> pd.Da
             what,
             "Check the file.",
             path=path,
+            **(place or {}),
         ) from error
 
 

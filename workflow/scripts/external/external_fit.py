@@ -1,8 +1,5 @@
 """Pose and weights of a take whose base is another tracker's sequence."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 
 from vermilion.config.tracking import ExternalBaseConfig
@@ -13,6 +10,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
+from vermilion.storage.json_files import load_json
 from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.tracking.result import Identity
@@ -34,7 +32,7 @@ def main(snakemake):
         own[:, model.landmarks].astype(np.float64),
         track.points_px,
         read_cameras(inputs.cameras)[params.camera],
-        calibrated=json.loads(Path(inputs.calibration).read_text())["calibrated"],
+        calibrated=load_json(inputs.calibration)["calibrated"],
         world=options.world,
     )
     whose = "the capture's" if placement.as_given else "its own, found by the landmarks"

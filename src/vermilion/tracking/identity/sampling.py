@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.frames import evenly_spaced
+from vermilion.storage.json_files import load_json
 from vermilion.tracking.identity.landmark_identity import TakeSample
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px
 
@@ -58,8 +58,7 @@ def sample_takes(
         name, camera = row["take"], read_cameras(folder)[row["camera"]]
         rows = chosen.get(name, np.zeros(0, dtype=int))
         frames = tracks[name].frames[rows]
-        with open(summary, encoding="utf-8") as stream:
-            calibrated = bool(json.load(stream)["calibrated"])
+        calibrated = bool(load_json(summary)["calibrated"])
         seen = Observations.of(tracks[name], camera)[rows]
         neutral = frames == row["neutral"]
         sample = TakeSample(name, seen, focal_px(camera), calibrated, neutral)
