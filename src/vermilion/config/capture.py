@@ -229,6 +229,12 @@ class CaptureConfig(StageConfig):
         "studio configuration has it (`ACEScg`, `ARRI LogC3 (EI800)`, ...); by default sRGB, and linear "
         "sRGB for EXR and HDR. Videos are read by their tags.",
     )
+    confined_to: list[str] = Field(
+        default_factory=list,
+        description="For captures that are not trusted: folders out of which nothing may lead, neither a "
+        "`source` of the take sheet (`..`, absolute, links), nor a link below one, nor a file that a USD "
+        "names, nor a key that names data of captures. Empty: any path is allowed.",
+    )
     manifest: ManifestConfig = section(
         ManifestConfig, "What the manifest records about the images."
     )

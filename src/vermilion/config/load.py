@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from vermilion.config.confined import allowed_folders, key_problems, sheet_problems
 from vermilion.config.cross_checks import cross_checks
 from vermilion.config.external_base import (
     external_problems,
@@ -51,11 +52,17 @@ def load_configuration(
         unknown = [item for item in error.errors() if not (problems and _is_earlier(item))]
         problems += [_sentence(origin, item) for item in unknown]
     sheet = raw.get("takes", Configuration.model_fields["takes"].default)
+    folders = allowed_folders(raw) if check_disk else []
+    leading_out = sheet_problems(str(sheet), folders)
+    if leading_out:  # before anything there is opened
+        raise ConfigurationError(problems + leading_out)
     takes, wrong = read_takes(str(sheet))
     problems += wrong + [f"{sheet}: {problem}" for problem in external_problems(takes)]
     takes = with_frames_of_images(takes)
     if configuration is not None:
         problems += [f"{origin}, key {problem}" for problem in cross_checks(configuration, takes)]
+        names = [{"subject": take.subject, "take": take.take, "of": take.of} for take in takes]
+        problems += [f"{origin}, {p}" for p in key_problems(configuration, names, folders)]
     if check_disk and configuration is not None:
         files = missing_files(configuration, takes)
         problems += [f"{origin}, key {problem}" for problem in files]

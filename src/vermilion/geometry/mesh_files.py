@@ -45,7 +45,9 @@ def read_mesh(path: str | Path) -> Mesh:
 
     try:
         # `force` makes it a Trimesh, which the annotations of trimesh do not tell.
-        mesh: Any = trimesh.load(path, process=False, maintain_order=True, force="mesh")
+        mesh: Any = trimesh.load(
+            path, process=False, maintain_order=True, force="mesh", skip_materials=True
+        )
     except Exception as error:
         raise InputError(
             f"an unreadable mesh ({error})", "PLY or OBJ", "Export the mesh again.", path=path

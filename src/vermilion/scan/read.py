@@ -32,7 +32,7 @@ def read_scan(path: str | Path, subject: str | None = None) -> Mesh:
             f"the suffix '{path.suffix}'", f"one of {', '.join(SUFFIXES)}", hint, **place
         )
     try:
-        loaded: Any = trimesh.load(path, process=False, force="mesh")
+        loaded: Any = trimesh.load(path, process=False, force="mesh", skip_materials=True)
         vertices = np.asarray(loaded.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # trimesh raises many kinds
