@@ -101,6 +101,20 @@ def test_a_weak_ridge_beside_the_teeth_is_not_passed_over_for_the_other_lip():
     assert (found.inner_px[middle, 1] < corner_row - 4).all()
 
 
+def test_landmarks_tell_how_thick_a_lip_is_where_the_models_is_another():
+    """An upper lip of 3 px above teeth; the model's closed mouth has one of 16 px, near the lower lip's border."""
+    model, camera = mouth_model(0.3, 16.0), facing_camera()
+    outer, inner = (ellipse((120.0, 150.0), 52.0, height, 80) for height in (16.0, 13.0))
+    inner[41:, 1] = 150.0 + 2.0 * (inner[41:, 1] - 150.0) / 13.0
+    upper = crest(inner[:41], (240, 240), 1.5)
+    maps = np.maximum(0.5 * upper, crest(inner[40:], (240, 240), 1.5)), crest(outer, (240, 240), 1.5)
+    middle = np.arange(12, 29)
+    of_model = sampler(model).find(model.neutral_mm, camera, maps)
+    assert of_model.inner_px[middle, 1].mean() > 148
+    found = sampler(model).find(model.neutral_mm, camera, maps, lips_px=(outer, inner))
+    np.testing.assert_allclose(found.inner_px[middle, 1], inner[middle, 1], atol=1.5)
+
+
 @pytest.mark.parametrize(
     "view",
     [

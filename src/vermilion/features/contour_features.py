@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vermilion.contours.curves import inward_normals, smoothed_ring
 from vermilion.faces.model import FaceModel
 from vermilion.features.distances import contour_distances
 from vermilion.features.rings import Ring, lip_rings
@@ -63,6 +64,7 @@ class ContourSampler:
         camera: Camera,
         maps: tuple[np.ndarray, np.ndarray] | None,
         pose: tuple[np.ndarray, np.ndarray] | None = None,
+        lips_px: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> FrameContours:
         """Contours and distances of a coarse mesh.
 
@@ -74,6 +76,8 @@ class ContourSampler:
             pose: rotation (3, 3) and translation (3,) mm of `world_from_head`: the search and the
                 distances are in the head frame, where a turn of the head is undone (Lips16 7).
                 None: they are in the image (Lips16 5.1).
+            lips_px: rings (m, 2) of dense landmarks, outer and inner: they tell how thick the lips are, as
+                the model's do not where it rolls another lip. None: the model's tell.
         """
         rotation, translation = pose or (np.eye(3), np.zeros(3))
 
@@ -95,9 +99,10 @@ class ContourSampler:
         if maps is not None:
             found = find_outer(maps[1], outer, unit, self.settings, to_pixels)
             outer, outer_found = found.points, found.found
-            found = find_inner(
-                maps[0], outer, model_inner - model_outer, unit, self.settings, to_pixels
-            )
+            lips, thickness = model_inner - model_outer, None
+            if lips_px is not None:
+                thickness = lip_thickness(*lips_px, len(outer)) / unit_px
+            found = find_inner(maps[0], outer, lips, unit, self.settings, to_pixels, thickness)
             inner, inner_found = found.points, found.found
         return FrameContours(
             contour_distances(outer, inner, unit),
@@ -109,6 +114,13 @@ class ContourSampler:
             inner_found,
             unit_px,
         )
+
+
+def lip_thickness(outer_px: np.ndarray, inner_px: np.ndarray, n: int) -> np.ndarray:
+    """How far (n,) px rings `outer_px`, `inner_px` (m, 2) lie apart, at n samples as evenly spaced as theirs."""
+    apart = ((inner_px - outer_px) * inward_normals(smoothed_ring(outer_px, 4))).sum(axis=1)
+    places = np.arange(n) * (len(apart) / n)
+    return np.interp(places, np.arange(len(apart) + 1), np.append(apart, apart[0]))
 
 
 def interocular_px(corners_mm: np.ndarray, camera: Camera) -> float:

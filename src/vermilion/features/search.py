@@ -106,6 +106,7 @@ def find_inner(
     unit: float,
     settings: SearchSettings,
     to_pixels: Callable[[np.ndarray], np.ndarray] = np.asarray,
+    thickness: np.ndarray | None = None,
 ) -> FoundRing:
     """The inner contour, looked for from the found outer contour inwards.
 
@@ -122,10 +123,11 @@ def find_inner(
         unit: inter-ocular distance, as the rings.
         settings: of the search.
         to_pixels: points (..., 3) of a ring in the head frame to pixels (..., 2).
+        thickness: (n,) of the lips, per inter-ocular distance, where something better than the model tells it.
     """
     normals = inward_normals(smoothed_ring(outer, 4))
     places = np.arange(0.0, settings.depth + 1e-9, settings.step)
-    expected = np.einsum("nk,nk->n", lips, normals) / unit
+    expected = np.einsum("nk,nk->n", lips, normals) / unit if thickness is None else thickness
     expected = np.clip(smoothed_ring(expected, 2), 0.0, settings.depth)
     lines, depth = outer[:, None] + places[:, None] * unit * normals[:, None], arch_depth(outer)
     model_inner = outer + lips

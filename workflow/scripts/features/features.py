@@ -54,13 +54,14 @@ def main(snakemake) -> None:
         path = Path(snakemake.input.maps) / f"{frame:06d}.exr"
         maps = read_maps(path, frame=frame) if path.exists() else None
         pose = (poses[0][index], poses[1][index]) if cfg.space == "head" else None
-        found = sampler.find(coarse[index], fit.camera, maps, pose)
+        seen = None if rings is None else rings(frame)
+        found = sampler.find(coarse[index], fit.camera, maps, pose, seen)
         tracked = bool(fit.valid[rows[index]])
         contours.append(found)
         row = quality_row(frame, found, tracked, maps is not None, cfg.least_found)
         if row.valid and rings is not None:
             known = [
-                (rings(frame) or (None, None))[1],
+                (seen or (None, None))[1],
                 lips.rings_px(coarse[index], fit.camera)[1],
             ]
             reason = contradiction(found.inner_px, known, found.interocular_px, cfg.most_apart)
