@@ -154,27 +154,27 @@ def median_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
 def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
     """Light (9, 3) by iteratively reweighted least squares."""
     seen = trust > 0
-    rows, weights = basis[seen], trust[seen]
-    values = colours[seen]
-    albedos = np.broadcast_to(albedo, colours.shape)[seen]
+    # A function or a channel a row: arrays are long, and loops over their short side cost most.
+    rows, weights = np.ascontiguousarray(basis[seen].T), trust[seen]
+    values = np.ascontiguousarray(colours[seen].T)
+    albedos = np.ascontiguousarray(np.broadcast_to(albedo, colours.shape)[seen].T)
     slope = display_slope(values)
     light = np.zeros((9, 3))
     ridge = 1e-4 * np.eye(9)
     robust = np.ones_like(values)
     for _ in range(rounds):
         for c in range(3):
-            w = weights * robust[:, c] * slope[:, c] ** 2
-            weighted = rows * (w * albedos[:, c] ** 2)[:, None]
-            matrix = weighted.T @ rows
+            w = weights * robust[c] * slope[c] ** 2
+            matrix = (rows * (w * albedos[c] ** 2)) @ rows.T
             if not np.trace(matrix) > 0:
                 raise InputError(
                     "no skin that its images show: the face is too small, too dark or hidden",
                     "a face whose eyes are some 60 pixels apart, in some frames",
                     "Leave the take out, or give frames that show the face larger.",
                 )
-            right = rows.T @ (w * albedos[:, c] * values[:, c])
+            right = rows @ (w * albedos[c] * values[c])
             light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
-        error = slope * (values - albedos * (rows @ light))
+        error = slope * (values - albedos * (light.T @ rows))
         robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
     return light
 
@@ -199,11 +199,12 @@ def fit_albedo(
     """
     robust = np.ones_like(colours)
     level = (skin * shading.reshape(-1, 3).mean(axis=0)) ** 2 / skin**2
+    shown = to_display_values(colours)
     for _ in range(rounds):
         weight = trust[..., None] * robust
         top = (weight * shading * colours).sum(axis=0) + prior * level * skin
         albedo = top / ((weight * shading**2).sum(axis=0) + prior * level)
         albedo = np.maximum(albedo, 1e-3)
-        error = to_display_values(colours) - to_display_values(albedo * shading)
+        error = shown - to_display_values(albedo * shading)
         robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
     return albedo

@@ -56,11 +56,11 @@ class SampledFace:
 
     def points(self, weights: np.ndarray) -> np.ndarray:
         """Points (N, 3) mm of `weights` (K,)."""
-        return self.neutral_mm + self.expressions_mm @ weights
+        return self.neutral_mm + _mixed(self.expressions_mm, weights)
 
     def normals(self, weights: np.ndarray) -> np.ndarray:
         """Unit normals (N, 3) of `weights` (K,), to first order."""
-        return normalised(self.neutral_normals + self.expression_normals @ weights)
+        return normalised(self.neutral_normals + _mixed(self.expression_normals, weights))
 
     def through_normals(self, weights: np.ndarray, by_normal: np.ndarray) -> np.ndarray:
         """Derivative (N, C, K) by the weights of C functions of the unit normal (chain rule).
@@ -69,7 +69,7 @@ class SampledFace:
             weights: (K,) where to differentiate.
             by_normal: (N, C, 3) derivative of the functions by the unit normal.
         """
-        cross = self.neutral_normals + self.expression_normals @ weights
+        cross = self.neutral_normals + _mixed(self.expression_normals, weights)
         length = np.linalg.norm(cross, axis=1)[:, None, None]
         unit = cross[:, None] / length
         across = by_normal - (by_normal * unit).sum(axis=2, keepdims=True) * unit
@@ -97,3 +97,12 @@ def cross_change(
     a, b, c = (vertices_mm[triangles[:, k]] for k in range(3))
     da, db, dc = (displacement_mm[triangles[:, k]].astype(np.float64) for k in range(3))
     return np.cross(db - da, c - a) + np.cross(b - a, dc - da)
+
+
+def _mixed(shapes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Sum (N, 3) of `shapes` (N, 3, K) times `weights` (K,), in the precision of the shapes.
+
+    As one matrix of 3 N rows: numpy makes a product of each of N small matrices otherwise.
+    """
+    flat = shapes.reshape(-1, shapes.shape[2])
+    return (flat @ weights.astype(shapes.dtype)).reshape(shapes.shape[:2])

@@ -139,9 +139,9 @@ class FrameProblem:
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
             # Coarse images need fewer samples.
             part = self._exposed(self._visible(view, 2**level), x, view, level)
-            cost = self._cost(x, view, level, part)
+            cost, errors = self._cost(x, view, level, part)
             for _ in range(count):
-                matrix, right = self._normal_equations(x, view, level, part)
+                matrix, right = self._normal_equations(x, view, level, part, errors)
                 target = solve_in_box(
                     BandMatrix(matrix[None], none, none),
                     right[None],
@@ -151,13 +151,13 @@ class FrameProblem:
                 )[0]
                 for scale in (1.0, 0.5, 0.25):
                     trial = x + scale * (target - x)
-                    trial_cost = self._cost(trial, view, level, part)
+                    trial_cost, trial_errors = self._cost(trial, view, level, part)
                     if trial_cost < cost:
                         break
                 else:
                     break
-                x, cost = trial, trial_cost
-        matrix, right = self._normal_equations(x, view, 0, part)
+                x, cost, errors = trial, trial_cost, trial_errors
+        matrix, right = self._normal_equations(x, view, 0, part, errors)
         return FrameFit(x, matrix, right, part.gain)
 
     def _exposed(self, part: _VisibleSamples, x, view: FrameView, level: int) -> _VisibleSamples:
@@ -184,19 +184,21 @@ class FrameProblem:
         parts = (rotation, turned, points, normals, seen, found, predicted)
         return error, parts, part.trust * inside
 
-    def _cost(self, x, view, level, part) -> float:
-        error, _, weight = self._errors(x, view, level, part)
+    def _cost(self, x, view, level, part) -> tuple[float, tuple]:
+        """The energy at x, and the errors that it is of."""
+        errors = self._errors(x, view, level, part)
+        error, _, weight = errors
         s = self.settings
         squared = (error**2).sum(axis=1) / (3 * s.sigma**2 * s.robust_sigmas**2)
         rho = 0.5 * s.robust_sigmas**2 * np.log1p(squared)
         total = s.strength * (weight * rho).sum() / max(weight.sum(), 1e-9)
         total += view.landmarks.cost(x, view.reference)
         total += 0.5 * (self.weight_prior * x**2).sum()
-        return float(total + 0.5 * (self.stay * (x - view.start) ** 2).sum())
+        return float(total + 0.5 * (self.stay * (x - view.start) ** 2).sum()), errors
 
-    def _normal_equations(self, x, view, level, part):
+    def _normal_equations(self, x, view, level, part, errors):
         """A (6 + K, 6 + K) and b (6 + K,) of the energy's quadratic model x'Ax/2 - b'x at x."""
-        error, parts, weight = self._errors(x, view, level, part)
+        error, parts, weight = errors
         s = self.settings
         robust = 1.0 / (1.0 + (error**2).sum(axis=1) / (3 * s.sigma**2 * s.robust_sigmas**2))
         scale = s.strength / (3 * s.sigma**2) * weight * robust / max(weight.sum(), 1e-9)
