@@ -11,7 +11,12 @@ gc.freeze()
 gc.set_threshold(50_000)
 
 # A job uses the cores that Snakemake gives it; the libraries under it start no threads of their own.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+for variable in (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OPENCV_FOR_THREADS_NUM",
+):
     os.environ.setdefault(variable, "1")
 
 from snakemake.exceptions import WorkflowError

@@ -17,16 +17,34 @@ def sample(image: np.ndarray, points: np.ndarray) -> np.ndarray:
     return sample_bilinear(np.asarray(image, np.float32), np.asarray(points, np.float32))
 
 
+#: Wider Gaussians are taken of an image of half the size or less, whose Gaussian is at least half as wide.
+_WIDE = 8.0
+
+
 def blur(values: np.ndarray, sigma: float) -> np.ndarray:
     """Gaussian of an image with zeros outside, (h, w, c) or (h, w).
 
     `values` (h, w, c) or (h, w); `sigma` in texels or pixels.
     """
+    values = np.asarray(values, dtype=np.float32)
     if sigma <= 0:
-        return np.asarray(values, dtype=np.float32)
-    return cv2.GaussianBlur(
-        np.asarray(values, dtype=np.float32), (0, 0), sigma, borderType=cv2.BORDER_CONSTANT
+        return values
+    if sigma <= _WIDE:
+        return cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_CONSTANT)
+    factor = 2 ** int(np.ceil(np.log2(sigma / _WIDE)))
+    height, width = values.shape[:2]
+    # Zeros all round: the result beside the border is interpolated too, and blocks are whole.
+    bottom, right = 2 * factor - height % factor, 2 * factor - width % factor
+    padded = cv2.copyMakeBorder(values, factor, bottom, factor, right, cv2.BORDER_CONSTANT, value=0)
+    size = padded.shape[1] // factor, padded.shape[0] // factor
+    small = cv2.resize(padded, size, interpolation=cv2.INTER_AREA)
+    # Averages of blocks and interpolation between them blur already.
+    own = (factor**2 - 1) / 12 / factor**2 + 1 / 6
+    small = cv2.GaussianBlur(
+        small, (0, 0), np.sqrt((sigma / factor) ** 2 - own), borderType=cv2.BORDER_CONSTANT
     )
+    whole = cv2.resize(small, padded.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    return whole[factor : factor + height, factor : factor + width]
 
 
 def weighted_blur(
