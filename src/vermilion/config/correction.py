@@ -85,14 +85,14 @@ class ImageAgreementConfig(StageConfig):
         "0: no filter.",
     )
     contour_weight: float = Field(
-        1.0,
+        3.0,
         ge=0.0,
         le=1000.0,
         description="Weight, per millimetre of lip contour, of the constraint that it projects onto the "
         "contour found in the image. 0: no constraint.",
     )
     bending_mm: float = Field(
-        10.0,
+        4.0,
         ge=0.0,
         le=100.0,
         description="Where contours and contact move the lips, they bend as a plate over shorter lengths "
