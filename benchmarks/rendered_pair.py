@@ -90,7 +90,7 @@ class RenderedPair:
         """The plan of the tattooed take, without the tattoo."""
         studio = StudioConfig()
         keys = (
-            "identity_spread", "seed", "slight_open", "ease_in_frames", "intensity",
+            "identity_spread", "expression_spread", "seed", "slight_open", "ease_in_frames", "intensity",
             "head_turn_deg", "head_shift_mm",
         )  # fmt: skip
         values = {

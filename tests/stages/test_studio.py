@@ -58,6 +58,7 @@ def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights=
             "lights": lights,
         },
         "identity_spread": 0.7,
+        "expression_spread": 0.0,
         "seed": 0,
         "slight_open": 0.08,
         "ease_in_frames": 6,

@@ -11,6 +11,7 @@ from vermilion.studio.rig import FRONTAL_PAIR, camera_names
 
 STUDIO_PLAN_KEYS = (
     "identity_spread",
+    "expression_spread",
     "seed",
     "slight_open",
     "ease_in_frames",

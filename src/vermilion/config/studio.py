@@ -78,6 +78,13 @@ class StudioConfig(StageConfig):
         le=2,
         description="Deviation of drawn identity coefficients (standard deviations).",
     )
+    expression_spread: float = Field(
+        0.0,
+        ge=0,
+        le=2,
+        description="How far each actor's expressions are their own: gain, direction and a smooth field for "
+        "each shape (0: those of the face model; 1: as different as people are).",
+    )
     face_size_px: tuple[int, int] = Field(
         (512, 512), description="Width and height of the six face cameras' images (px)."
     )

@@ -15,6 +15,7 @@ from vermilion.studio import rig
 from vermilion.studio.lighting import LIGHTINGS, Lighting
 from vermilion.studio.live_link import read_live_link
 from vermilion.studio.look import Look, look_of
+from vermilion.studio.own_expressions import with_own_expressions
 from vermilion.studio.performance import (
     Performance,
     generated_weights,
@@ -107,7 +108,7 @@ def plan_take(model: FaceModel, settings: TakeSettings) -> StudioTakePlan:
     )
     identity = identity_of(model, actor.identity, actor.seed, actor.identity_spread)
     return StudioTakePlan(
-        model=model,
+        model=with_own_expressions(model, actor.seed, actor.expression_spread),
         identities=np.broadcast_to(identity, (n_frames, len(identity))),
         performance=Performance(names, weights, *head),
         looks=np.full(n_frames, actor.seed),

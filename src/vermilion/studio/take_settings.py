@@ -17,11 +17,13 @@ class Actor:
         seed: of shape and skin.
         identity: coefficients (standard deviations); None: drawn from the seed.
         identity_spread: deviation of drawn coefficients.
+        expression_spread: how far the actor's expressions are from the model's (`with_own_expressions`).
     """
 
     seed: int
     identity: Sequence[float] | None
     identity_spread: float
+    expression_spread: float
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,8 @@ def take_settings(values: Mapping[str, Any]) -> TakeSettings:
 
     Args:
         values: `role`, `first`, `last`, `fps` of the take sheet; `actor` with `seed` and `identity`;
-            `performance` with the fields of `PerformanceSettings`; `seed` and `identity_spread` of
-            the studio, and the fields of `MotionSettings`.
+            `performance` with the fields of `PerformanceSettings`; `seed`, `identity_spread`
+            and `expression_spread` of the studio, and the fields of `MotionSettings`.
     """
     actor, performance = values["actor"], dict(values["performance"])
     seed = int(np.random.default_rng([values["seed"], actor["seed"]]).integers(2**31))
@@ -95,7 +97,9 @@ def take_settings(values: Mapping[str, Any]) -> TakeSettings:
         role=values["role"],
         n_frames=values["last"] - values["first"] + 1,
         fps=values["fps"],
-        actor=Actor(seed, actor["identity"], values["identity_spread"]),
+        actor=Actor(
+            seed, actor["identity"], values["identity_spread"], values["expression_spread"]
+        ),
         performance=PerformanceSettings(**performance),
         motion=MotionSettings(**{key.name: values[key.name] for key in fields(MotionSettings)}),
     )
