@@ -62,6 +62,11 @@ class FaceModelConfig(StageConfig):
     tracker_identities: int = Field(
         10, ge=0, le=100, description="Identity modes that the tracker may fit."
     )
+    tracker_expressions: Literal["all", "few"] = Field(
+        "all",
+        description="Expressions that the tracker may fit: `all` of the face model, or `few`: without rolls, "
+        "presses, funnels, shrugs and the like, a handicapped base for comparison.",
+    )
     seed: int = Field(
         0, ge=0, description="Seed of the small asymmetries of the procedural studio head."
     )

@@ -61,6 +61,19 @@ class ModelFitConfig(StageConfig):
         le=100,
         description="Deviation of the closing lids' weights about zero, where larger: blinks are whole.",
     )
+    side_weight_share: float = Field(
+        0.2,
+        gt=0.001,
+        le=1,
+        description="Deviation of the weights that move jaw or mouth sideways, as a share of `weight_sigma`: people "
+        "hardly do, and a turned head looks alike (1).",
+    )
+    rare_weight_share: float = Field(
+        0.4,
+        gt=0.001,
+        le=1,
+        description="The same for a jaw pushed forward, puffed cheeks, rolled and pressed lips and dimples (1).",
+    )
     jaw_slide: float = Field(
         0.1,
         ge=0,

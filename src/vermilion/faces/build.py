@@ -17,6 +17,7 @@ class FaceModelSettings:
         template_slight_open: weight of jawOpen in the neutral of the template.
         tracker_triangles: target number of the tracker's triangles.
         studio_identities, tracker_identities: identity modes.
+        tracker_expressions: `all` of the face model, or `few`.
         studio_spacing_mm, template_spacing_mm: of vertices at the lips (`procedural`).
         seed: of the asymmetries of the studio's head (`procedural`).
     """
@@ -25,6 +26,7 @@ class FaceModelSettings:
     tracker_triangles: int
     studio_identities: int
     tracker_identities: int
+    tracker_expressions: str
     studio_spacing_mm: float
     template_spacing_mm: float
     seed: int
@@ -39,6 +41,7 @@ def build_models(
     """
     n_identities, slight_open = settings.studio_identities, settings.template_slight_open
     triangles, n_fitted = settings.tracker_triangles, settings.tracker_identities
+    few = settings.tracker_expressions == "few"
     if name == "procedural":
         from vermilion.faces import procedural
 
@@ -49,7 +52,7 @@ def build_models(
             "template": procedural.template_model(
                 slight_open, settings.template_spacing_mm, n_identities
             ),
-            "tracker": procedural.tracker_model(triangles, n_fitted),
+            "tracker": procedural.tracker_model(triangles, n_fitted, few=few),
         }
     if name == "ict" and source:
         from vermilion.faces import ict
@@ -61,7 +64,13 @@ def build_models(
         return {
             "studio": ict.studio_model(data, n_identities),
             "template": ict.template_model(data, slight_open, n_identities),
-            "tracker": ict.tracker_model(data, triangles, slight_open, n_fitted),
+            "tracker": ict.tracker_model(
+                data,
+                triangles,
+                slight_open,
+                n_fitted,
+                ict.FEW_EXPRESSIONS if few else data.expression_names,
+            ),
         }
     raise InputError(
         f"face model '{name}' with the source '{source or ''}'",

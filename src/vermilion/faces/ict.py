@@ -44,8 +44,8 @@ VERMILION_INSIDE_MM = 1.5
 #: How much of the inside of the lips the template keeps (mm along the surface).
 TEMPLATE_INSIDE_MM = 9.0
 
-#: ARKit shapes of the tracker: no rolls, presses, shrugs or funnel, no eye gaze.
-TRACKER_EXPRESSIONS = (
+#: ARKit shapes of a handicapped tracker: no rolls, presses, shrugs or funnel, no eye gaze.
+FEW_EXPRESSIONS = (
     "browDown_L",
     "browDown_R",
     "browInnerUp_L",
@@ -118,9 +118,9 @@ def tracker_model(
     n_identities: int = 40,
     expressions: tuple[str, ...] | None = None,
 ) -> FaceModel:
-    """A coarser face of another topology with fewer expressions, carried over by position."""
+    """A coarser face of another topology, carried over by position; all expressions unless some are named."""
     crop = face_crop(studio_model(data, n_identities), slight_open, with_expressions=True)
-    names = TRACKER_EXPRESSIONS if expressions is None else expressions
+    names = data.expression_names if expressions is None else expressions
     return decimate_model(crop, n_triangles, expressions=tuple(names))
 
 

@@ -78,16 +78,21 @@ def template_model(
     )
 
 
-def tracker_model(n_triangles: int = 6000, n_identities: int = len(IDENTITY_NAMES)) -> FaceModel:
-    """A coarse head with fewer expressions and no lip rolls: topology of C.
+def tracker_model(
+    n_triangles: int = 6000, n_identities: int = len(IDENTITY_NAMES), *, few: bool = True
+) -> FaceModel:
+    """A coarse head: topology of C.
 
     Args:
         n_triangles: target count; met within some per cent.
         n_identities: identity modes.
+        few: fewer expressions and no lip rolls; else all of the studio's.
     """
     layout = _tracker_layout(n_triangles)
     mesh = build_head_mesh(layout)
-    return _head_model("procedural-tracker", mesh, TRACKER_SHAPES, False, n_identities)
+    return _head_model(
+        "procedural-tracker", mesh, TRACKER_SHAPES if few else STUDIO_SHAPES, not few, n_identities
+    )
 
 
 def _rings(length_mm: float, spacing_mm: float) -> int:

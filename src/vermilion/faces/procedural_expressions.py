@@ -210,7 +210,7 @@ def _library(rolls: bool) -> dict[str, Callable[[Fields], np.ndarray]]:
 
 
 STUDIO_SHAPES = tuple(_library(True))
-#: The tracker has no rolls, press, funnel, shrugs or dimples: those are left to the correction.
+#: A handicapped tracker has no rolls, press, funnel, shrugs or dimples: those are left to the correction.
 TRACKER_SHAPES = tuple(
     name
     for name in STUDIO_SHAPES

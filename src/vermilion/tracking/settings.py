@@ -19,6 +19,8 @@ def landmark_fit_settings(
         noise=noise,
         weight_sigma=fit["weight_sigma"],
         lid_weight_sigma=fit["lid_weight_sigma"],
+        side_weight_share=fit["side_weight_share"],
+        rare_weight_share=fit["rare_weight_share"],
         jaw_slide=fit["jaw_slide"],
         **motion,
     )

@@ -144,9 +144,10 @@ class IdentityProblem:
         self.take = np.repeat(np.arange(len(samples)), counts)
         self.n_frames = len(self.take)
         neutral = np.concatenate([s.neutral[k] for s, k in zip(samples, keep, strict=True)])
-        sigma = np.where(neutral, settings.neutral_weight_sigma, settings.fit.weight_sigma)
+        usual = settings.fit.weight_sigmas(self.shape.expression_names, self.n_weights)
+        sigma = np.where(neutral[:, None], settings.neutral_weight_sigma, usual)
         self.frame_prior = np.zeros((self.n_frames, N_POSE + self.n_weights))
-        self.frame_prior[:, N_POSE:] = sigma[:, None] ** -2.0
+        self.frame_prior[:, N_POSE:] = sigma**-2.0
         self.guess = np.log([sample.focal_px for sample in samples])
         self.centre = np.concatenate([np.zeros(self.n_identity + self.n_offset), self.guess])
         # A known focal length is one whose prior is so tight that it cannot move.

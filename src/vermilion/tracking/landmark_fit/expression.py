@@ -34,10 +34,10 @@ from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.landmark_fit.smoothness import (
     TemporalSmoothness,
     fast_shapes,
-    weight_sigmas,
 )
 from vermilion.tracking.landmark_fit.start import fill_gaps, first_guess
 from vermilion.tracking.landmark_fit.timeline import Timeline
+from vermilion.tracking.landmark_fit.weight_prior import weight_sigmas
 
 N_POSE = 6
 _FRAMES_AT_ONCE = 256
@@ -49,14 +49,12 @@ class LandmarkFitSettings:
 
     Attributes:
         noise: of the landmarks.
-        weight_sigma: deviation of a blend weight about zero.
         rotation_acceleration_deg, translation_acceleration_mm, weight_acceleration: typical
             accelerations, per second squared; infinite switches smoothness off.
         fast_limit: lids or mouth that accelerate this many times as much as noise does are half free.
-        lid_weight_sigma: deviation of the lids' weights about zero: blinks are none too rare.
+        weight_sigma, lid_weight_sigma, side_weight_share, rare_weight_share: `WeightPrior`.
         jaw_slide: weight of the residual along the jaw line, 0 (slides freely) to 1.
-        iterations: Gauss-Newton steps, at most.
-        tolerance_mm: stop when no landmark moves more.
+        iterations, tolerance_mm: Gauss-Newton steps at most; stop when no landmark moves more.
     """
 
     noise: LandmarkNoise = field(default_factory=LandmarkNoise)
@@ -66,6 +64,8 @@ class LandmarkFitSettings:
     weight_acceleration: float = 40.0
     fast_limit: float = 3.5
     lid_weight_sigma: float = 1.0
+    side_weight_share: float = 0.2
+    rare_weight_share: float = 0.4
     jaw_slide: float = 0.1
     iterations: int = 15
     tolerance_mm: float = 0.01
@@ -85,7 +85,7 @@ class LandmarkFitSettings:
 
     def weight_sigmas(self, names: Sequence[str], n_weights: int) -> np.ndarray:
         """(K,) deviations of K = `n_weights` blend weights about zero; `names` of the shapes, or none."""
-        return weight_sigmas(names, n_weights, self.weight_sigma, self.lid_weight_sigma)
+        return weight_sigmas(names, n_weights, self)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ same trade places from frame to frame without moving anything. Frames 0.04 s apa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,16 +101,6 @@ def fast_shapes(
         if noise_mm > 0:
             found.append(FastShapes(np.array(ids), basis, noise_mm))
     return tuple(found)
-
-
-def weight_sigmas(
-    names: Sequence[str], n_weights: int, sigma: float, lid_sigma: float
-) -> np.ndarray:
-    """(K,) deviations of K = `n_weights` blend weights about zero; of closing lids `lid_sigma`, if larger."""
-    lids = [k for k, name in enumerate(names) if name.startswith("eyeBlink")]
-    result = np.full(n_weights, float(sigma))
-    result[lids] = max(lid_sigma, sigma)
-    return result
 
 
 def _points_of(name: str, landmark_set: LandmarkSet) -> np.ndarray:
