@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Sizes of the captures."""
     parser.add_argument("--frames", type=int, nargs="+", default=[100, 1000, 10_000])
     parser.add_argument("--subjects", type=int, default=10, help="each with a rig take and a video")
-    parser.add_argument("--chunk", type=int, default=250, help="chunk_frames, as the profiles have it")
+    parser.add_argument(
+        "--chunk", type=int, default=250, help="chunk_frames, as the profiles have it"
+    )
     parser.add_argument("--folder", type=Path, help="to work in (a temporary one)")
 
 
@@ -45,7 +47,9 @@ def run(arguments: argparse.Namespace) -> None:
             print_table(rows)
     for before, after in zip(rows, rows[1:], strict=False):
         growth = after["plan_core_s"] / before["plan_core_s"] / (after["jobs"] / before["jobs"])
-        print(f"{before['frames']} > {after['frames']} frames: planning a job costs {growth:.2f} times as much")
+        print(
+            f"{before['frames']} > {after['frames']} frames: planning a job costs {growth:.2f} times as much"
+        )
 
 
 def measured(folder: Path, frames: int, subjects: int, chunk: int) -> dict[str, float]:
@@ -74,7 +78,11 @@ def make_project(folder: Path, frames: int, subjects: int, chunk: int) -> None:
     rows = ["subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit"]
     each = frames // (2 * subjects)
     for n in range(subjects):
-        for take, role, count in (("plain", "plain", 1), ("rom", "tattoo", each), ("phone", "video", each)):
+        for take, role, count in (
+            ("plain", "plain", 1),
+            ("rom", "tattoo", each),
+            ("phone", "video", each),
+        ):
             names = [MONOCULAR] if role == "video" else [f"face{k}" for k in range(FACE_CAMERAS)]
             source = folder / "captures" / f"p{n}" / take
             write_cameras(source / "cameras", {k: pinhole(k, 1e3, 640, 480, pose) for k in names})
@@ -83,7 +91,11 @@ def make_project(folder: Path, frames: int, subjects: int, chunk: int) -> None:
                 images.mkdir(parents=True)
                 for frame in range(count):
                     (images / f"{frame:06d}.png").touch()
-            split = f"test:{max(count - chunk, 1)}-{count - 1}" if role == "tattoo" and count > 1 else "none"
+            split = (
+                f"test:{max(count - chunk, 1)}-{count - 1}"
+                if role == "tattoo" and count > 1
+                else "none"
+            )
             rows.append(f"p{n}\t{take}\t{role}\t{source}\t0\t{count - 1}\t30\t{split}")
     (folder / "takes.tsv").write_text("\n".join(rows) + "\n")
     content = {

@@ -107,7 +107,10 @@ def test_landmarks_tell_how_thick_a_lip_is_where_the_models_is_another():
     outer, inner = (ellipse((120.0, 150.0), 52.0, height, 80) for height in (16.0, 13.0))
     inner[41:, 1] = 150.0 + 2.0 * (inner[41:, 1] - 150.0) / 13.0
     upper = crest(inner[:41], (240, 240), 1.5)
-    maps = np.maximum(0.5 * upper, crest(inner[40:], (240, 240), 1.5)), crest(outer, (240, 240), 1.5)
+    maps = (
+        np.maximum(0.5 * upper, crest(inner[40:], (240, 240), 1.5)),
+        crest(outer, (240, 240), 1.5),
+    )
     middle = np.arange(12, 29)
     of_model = sampler(model).find(model.neutral_mm, camera, maps)
     assert of_model.inner_px[middle, 1].mean() > 148

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.stranger import StrangerTruth, figures, parts
+from benchmarks.unseen_subject import UnseenSubjectTruth, figures, parts
 from tests.heads import small_tracker
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correspondence.correspondence import CorrespondenceSettings
@@ -43,7 +43,7 @@ def reference(model, neutral):
     shapes = neutral + (0.5 - 0.5 * np.cos(PHASE))[:, None, None] * (smile @ TO_WORLD.T)
     frames = shapes @ np.swapaxes(TURNS, 1, 2)
     landmarks = ScanLandmarks(neutral[model.landmarks], np.zeros(66))
-    truth = StrangerTruth(neutral, frames, model.triangles, landmarks)
+    truth = UnseenSubjectTruth(neutral, frames, model.triangles, landmarks)
     return truth.reference(model, 0.09, MatchTolerance(6.0, 60.0)), frames
 
 

@@ -70,7 +70,7 @@ _FAR_MM = 1.0
 
 
 @dataclass(frozen=True)
-class StrangerTruth:
+class UnseenSubjectTruth:
     """Truth of a take: neutral (S, 3), frames (F, S, 3), mm, triangles (T, 3), its 66 landmarks."""
 
     neutral_mm: np.ndarray
@@ -109,14 +109,14 @@ class StrangerTruth:
 
 def truth_of(
     run: FinishedRun, frames: np.ndarray, first: int, landmarks: Path | None
-) -> StrangerTruth:
+) -> UnseenSubjectTruth:
     """The truth of the `frames` (F,) of a take that begins with frame `first`."""
     vertices, triangles = read_truth(
         run.truth / "vertices_mm.npy", run.truth / "triangles.npy", frames - first
     )
     neutral = np.load(run.truth / "neutral_mm.npy").astype(np.float64)
     if landmarks is not None:
-        return StrangerTruth(neutral, vertices, triangles, read_landmarks(landmarks))
+        return UnseenSubjectTruth(neutral, vertices, triangles, read_landmarks(landmarks))
     ids = run.model("studio").landmarks
     if ids.max() >= len(neutral):
         raise InputError(
@@ -125,7 +125,9 @@ def truth_of(
             "Give the neutral's landmarks (--landmarks).",
             path=run.truth,
         )
-    return StrangerTruth(neutral, vertices, triangles, ScanLandmarks(neutral[ids], np.zeros(66)))
+    return UnseenSubjectTruth(
+        neutral, vertices, triangles, ScanLandmarks(neutral[ids], np.zeros(66))
+    )
 
 
 def tracked_take(run: FinishedRun, model: FaceModel) -> CoarseTake:
