@@ -18,6 +18,8 @@ from vermilion.geometry.mesh import Mesh, submesh, unique_edges
 from vermilion.scan.landmarks import ScanLandmarks
 from vermilion.storage.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 PERSON = np.array([0.5, -1.0, 0.8, 0.3])
 #: The tracker's own frame: turned, and away from the origin.
 TURN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -80,6 +82,21 @@ def test_contours_are_closed_loops_of_edges_and_lips_are_never_mixed(opening):
     # A closed mouth has an upper and a lower part of the inner contour all the same.
     inner = model.inner_contour
     assert (upper[inner] > lower[inner]).sum() > 6 and (lower[inner] > upper[inner]).sum() > 6
+
+
+def test_a_mask_whose_mouth_is_a_hole_is_labelled_as_well():
+    tracker, model, own_mm, face = foreign()
+    studio = small_studio()
+    kept = ~(model.regions["mouth_inner"] | model.regions["eyes"] | model.regions["teeth"])
+    ids, triangles = submesh(model.triangles, kept)
+    landmarks = ScanLandmarks(face[studio.landmarks] @ TURN.T + AWAY_MM, np.zeros(66))
+    mesh = Mesh(own_mm[ids] @ TURN.T + AWAY_MM, triangles)
+    mask = label_topology(small_tracker(), mesh, landmarks, least_opening=-SLIGHTLY_OPEN).model
+    for name in ("vermilion_upper", "vermilion_lower", "face"):
+        ours, theirs = model.regions[name][ids], mask.regions[name]
+        assert (ours & theirs).sum() / (ours | theirs).sum() > 0.9, name
+    for name in ("mouth_inner", "teeth", "eyes"):
+        assert not mask.regions[name].any(), name
 
 
 def test_what_has_no_face_or_no_mouth_is_one_sentence():
