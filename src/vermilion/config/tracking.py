@@ -122,6 +122,12 @@ class IdentityConfig(StageConfig):
         LandmarkBiases,
         "Deviation of the person's detected landmarks from the model's, constant over all frames.",
     )
+    own_lips: bool = Field(
+        True,
+        description="Where landmarks are dense (`mediapipe`): move the neutral's mouth to where the lips are "
+        "seen on the whole, as the tracker's identities have no such lips. The 66 landmarks of other detectors "
+        "are off by much the same for everybody, so it does not count with them.",
+    )
     neutral_weight_sigma: float = Field(
         0.03,
         gt=0.001,

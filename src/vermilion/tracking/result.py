@@ -13,6 +13,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.tracking.identity.landmark_identity import IdentityFit, TakeSample
+from vermilion.tracking.identity.lip_offset import lip_offset
 from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.places import LandmarkPlaces
 
@@ -23,7 +24,7 @@ class Identity:
 
     Attributes:
         identity: (I,) in standard deviations.
-        neutral_mm: (V, 3) in the head frame.
+        neutral_mm: (V, 3) in the head frame: the model's, and what it cannot show of the person.
         landmark_offset_mm: (N, 3) in the head frame: the neutral's landmarks as detected, minus
             the model's.
         takes: (T,) str, all of the subject's takes that were used.
@@ -52,17 +53,29 @@ class Identity:
         model: FaceModel,
         samples: Sequence[TakeSample],
         places: LandmarkPlaces | None = None,
+        own_lips: bool = False,
     ) -> Identity:
-        """Of a fit to the samples of some takes; `places` as for the fit."""
+        """Of a fit to the samples of some takes; `places` as for the fit.
+
+        `own_lips`: the neutral has the person's own mouth, as far as the landmark offsets tell it.
+        """
+        neutral = model.neutral_of(fit.identity)
+        if own_lips:
+            neutral = neutral + lip_offset(model, neutral, fit.landmark_offset_mm)
         return cls(
             identity=fit.identity,
-            neutral_mm=model.neutral_of(fit.identity),
+            neutral_mm=neutral,
             landmark_offset_mm=fit.landmark_offset_mm,
             takes=np.array([sample.name for sample in samples], dtype=str),
             focal_px=np.array([fit.focal_px[sample.name] for sample in samples]),
             calibrated=np.array([sample.calibrated for sample in samples]),
             places=places,
         )
+
+    def vertices(self, model: FaceModel, weights: np.ndarray) -> np.ndarray:
+        """The person's meshes (..., V, 3) mm of blend weights (..., K), head frame."""
+        own = self.neutral_mm - model.neutral_of(self.identity)
+        return model.vertices(self.identity, weights) + own
 
     def focal_of(self, take: str) -> float | None:
         """Estimated focal length of a take; None where the take is unknown or calibrated."""
@@ -200,7 +213,7 @@ class TrackedTake:
 
         `offsets_mm` (n, V, 3) in the head frame are added to the model's vertices.
         """
-        local = model.vertices(identity.identity, self.weights[rows])
+        local = identity.vertices(model, self.weights[rows])
         if offsets_mm is not None:
             local = local + offsets_mm
         turned = local @ np.swapaxes(self.world_from_head_rotation[rows], 1, 2)

@@ -3,7 +3,7 @@
 from vermilion.faces.model import FaceModel
 from vermilion.storage.logfile import log_to
 from vermilion.tracking.identity.landmark_identity import fit_identity
-from vermilion.tracking.identity.sampling import sample_takes
+from vermilion.tracking.identity.sampling import sample_takes, tells_lips
 from vermilion.tracking.result import Identity
 from vermilion.tracking.settings import identity_settings
 
@@ -17,7 +17,8 @@ def main(snakemake):
     settings = identity_settings(cfg["tracking.fit"], cfg["tracking.identity"])
     fit = fit_identity(tracker, samples, settings)
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
-    Identity.of(fit, tracker, samples).save(snakemake.output.identity)
+    own_lips = tells_lips(inputs.landmarks) and cfg["tracking.identity"]["own_lips"]
+    Identity.of(fit, tracker, samples, own_lips=own_lips).save(snakemake.output.identity)
 
 
 if __name__ == "__main__":

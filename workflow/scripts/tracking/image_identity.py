@@ -12,7 +12,7 @@ from vermilion.storage.progress import progress
 from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
 from vermilion.tracking.identity.joint_identity import fit_joint_identity
 from vermilion.tracking.identity.landmark_identity import IdentityProblem
-from vermilion.tracking.identity.sampling import sample_takes
+from vermilion.tracking.identity.sampling import sample_takes, tells_lips
 from vermilion.tracking.image_fit.overlay import residual_sheet
 from vermilion.tracking.image_fit.residual import photometric_residual
 from vermilion.tracking.result import Identity
@@ -61,7 +61,8 @@ def main(snakemake):
     shown = evenly_spaced(len(sheets), SHOWN)
     rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in shown]
     write_srgb8(snakemake.output.overlay, tile(rows, 1))
-    Identity.of(fit, tracker, samples).save(snakemake.output.identity)
+    own_lips = tells_lips(inputs.landmarks) and options["own_lips"]
+    Identity.of(fit, tracker, samples, own_lips=own_lips).save(snakemake.output.identity)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.json_files import load_json
 from vermilion.tracking.identity.landmark_identity import TakeSample
@@ -64,6 +65,11 @@ def sample_takes(
         sample = TakeSample(name, seen, focal_px(camera), calibrated, neutral)
         found.append(SampledFrames(sample, camera, frames))
     return found
+
+
+def tells_lips(landmarks: list[str]) -> bool:
+    """Whether the landmarks of all takes (files) draw lips as people have them: those of dense sets do."""
+    return all(LandmarkTrack.load(path, None).landmark_set is not IBUG66 for path in landmarks)
 
 
 def spread_frames(valid: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:

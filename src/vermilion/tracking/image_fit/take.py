@@ -126,7 +126,7 @@ class TakeStart:
 
     def vertices(self, x: np.ndarray) -> np.ndarray:
         """Mesh (V, 3) mm, camera frame, of x (6 + K,): rotation vector, translation, weights."""
-        local = self.model.vertices(self.identity.identity, x[N_POSE:])
+        local = self.identity.vertices(self.model, x[N_POSE:])
         return local @ (rotation_matrix(x[:3]) @ self.reference).T + x[3:6]
 
     def with_motion(self, fit: TrackedTake, x: np.ndarray) -> TrackedTake:
