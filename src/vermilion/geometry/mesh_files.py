@@ -78,8 +78,9 @@ def read_polygons(path: str | Path) -> tuple[np.ndarray, Polygons]:
             raise ValueError("no face")
     except (OSError, ValueError, IndexError, KeyError, OverflowError, MemoryError) as error:
         raise InputError(
-            f"an unreadable mesh ({error})", "OBJ, PLY or STL", "Export the mesh again.", path=path
-        ) from error
+            f"an unreadable mesh ({error!s:.200})", "OBJ, PLY or STL", "Export the mesh again.",
+            path=path,
+        ) from error  # fmt: skip
     if not np.isfinite(vertices).all():
         raise InputError(
             "vertices that are not finite", "numbers", "Export the mesh again.", path=path

@@ -36,7 +36,7 @@ def open_image(path: Path, **place) -> oiio.ImageInput:
         raise _unreadable(path, "it is empty", place)
     stream = oiio.ImageInput.open(str(path), _UNASSOCIATED)
     if not stream:
-        raise _unreadable(path, " ".join(oiio.geterror().split()), place)
+        raise _unreadable(path, _last_error(), place)
     check_size(stream, path, **place)
     return stream
 
@@ -64,6 +64,13 @@ def is_exr(stream: oiio.ImageInput) -> bool:
 def is_linear(stream: oiio.ImageInput) -> bool:
     """Whether the values of an open file are linear light."""
     return stream.format_name() in _LINEAR
+
+
+def _last_error() -> str:
+    try:
+        return " ".join(oiio.geterror().split())
+    except UnicodeDecodeError:  # it quotes the file
+        return "damaged header"
 
 
 def _unreadable(path: Path, why: str, place: dict) -> InputError:

@@ -63,7 +63,7 @@ class VideoReader:
     def __init__(self, path: str | Path, index: VideoIndex | None = None):
         self.path = Path(path)
         try:
-            self._container = av.open(str(self.path), options=_OPENING)
+            self._container = av.open(str(self.path), options=_OPENING, metadata_errors="replace")
             self._stream = _main_stream(self._container)
             self.index = index or _list_packets(self._container, self._stream)
         except (OSError, IndexError, av.FFmpegError) as error:

@@ -81,7 +81,7 @@ def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmark
     Raises InputError where there are fewer than six, or numbers that are no landmarks.
     """
     table = read_table(path, ["landmark", "x", "y", "z"])
-    numbers = table["landmark"].to_numpy()
+    numbers = pd.to_numeric(table["landmark"], errors="coerce").to_numpy()
     wrong = sorted(set(numbers.tolist()) - set(range(N_LANDMARKS)))
     if wrong or len(set(numbers)) < LEAST_GIVEN:
         raise InputError(

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from vermilion.geometry.mesh import Mesh, triangle_areas
+from vermilion.geometry.polygons import Polygons
 from vermilion.storage.errors import InputError
 
 SUFFIXES = (".obj", ".ply", ".stl")
@@ -35,6 +36,7 @@ def read_scan(path: str | Path, subject: str | None = None) -> Mesh:
         loaded: Any = trimesh.load(path, process=False, force="mesh", skip_materials=True)
         vertices = np.asarray(loaded.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
+        Polygons.of_corners(np.full(len(triangles), 3), triangles.ravel(), len(vertices))
     except Exception as error:  # trimesh raises many kinds
         raise InputError(f"no mesh that can be read ({error})", "a mesh", hint, **place) from error
     if len(triangles) and not np.isfinite(vertices).all():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 from zipfile import BadZipFile, ZipFile, ZipInfo
 
@@ -29,7 +30,7 @@ DAMAGE = (
         AttributeError,
         OverflowError,
     ),
-    *(MemoryError, RuntimeError, BadZipFile, zlib.error),
+    *(MemoryError, RuntimeError, BadZipFile, zlib.error, SyntaxError, TokenError),
 )
 #: Values packed better than so are no measurement; smaller arrays harm nobody.
 MOST_RATIO, HARMLESS_BYTES = 200, 1 << 28

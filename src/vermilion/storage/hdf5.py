@@ -30,7 +30,7 @@ def open_hdf5(path: str | Path, unreadable: Callable[[str], PlacedError]) -> h5p
     file = None
     try:
         file = h5py.File(path, "r")
-        _check_group(file, set())
+        _check_group(file, set(), Path(path).stat().st_size)
         return file
     except DAMAGE as error:
         if file is not None:
@@ -38,7 +38,7 @@ def open_hdf5(path: str | Path, unreadable: Callable[[str], PlacedError]) -> h5p
         raise unreadable(" ".join(str(error).split())[:200]) from error
 
 
-def _check_group(group: h5py.Group, seen: set[int]) -> None:
+def _check_group(group: h5py.Group, seen: set[int], file_bytes: int) -> None:
     for name in group:
         link = group.get(name, getlink=True)
         if not isinstance(link, h5py.HardLink):
@@ -49,8 +49,11 @@ def _check_group(group: h5py.Group, seen: set[int]) -> None:
             continue
         seen.add(address)
         if isinstance(item, h5py.Group):
-            _check_group(item, seen)
+            _check_group(item, seen, file_bytes)
         elif isinstance(item, h5py.Dataset):
             if item.is_virtual or item.external:
                 raise ValueError(f"the values of '{item.name}' lie in another file")
-            check_unpacked(item.nbytes, item.id.get_storage_size())
+            stored = item.id.get_storage_size()
+            if stored > file_bytes:
+                raise ValueError(f"'{item.name}' of {stored} bytes in a file of {file_bytes}")
+            check_unpacked(item.nbytes, stored)

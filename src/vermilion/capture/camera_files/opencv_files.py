@@ -8,6 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from vermilion.capture.camera_files.opencv_yaml import load_opencv_yaml
 from vermilion.capture.camera_files.rig_file import (
     RawCamera,
     RigFile,
@@ -21,34 +22,25 @@ _DISTORTION = ("distortion_coefficients", "dist", "D", "distCoeffs", "distortion
 _ROTATION = ("R", "rotation", "rvec", "Rot")
 _TRANSLATION = ("T", "t", "tvec", "translation")
 _HALF = 0.5  # OpenCV's top-left pixel has its centre at (0, 0)
-_DAMAGED = "empty or damaged"
 _WANTED = "OpenCV YAML with camera_matrix, distortion_coefficients, R and T (camera from world)"
 
 
 def read_opencv(paths: list[Path]) -> RigFile:
-    """Read the cameras of YAML or XML files of OpenCV's FileStorage.
+    """Read the cameras of YAML files of OpenCV's FileStorage.
 
     Either a file a camera, named after it, or a pair with `K_<name>`, `dist_<name>`, `Rot_<name>` or
     `R_<name>`, `T_<name>`.
 
     Raises InputError where a file cannot be read or a camera lacks matrix or pose.
     """
-    try:
-        return _read(paths)
-    except (cv2.error, SystemError, ValueError) as error:
-        why = str(error).strip().splitlines()[-1] if str(error).strip() else "damaged"
-        raise unreadable(paths[0], _WANTED, _DAMAGED if "cv2" in why else why) from error
-
-
-def _read(paths: list[Path]) -> RigFile:
-    stores = {path: _open(path) for path in paths}
-    names = [name for store in stores.values() for name in _listed(store)]
+    stores = [_open(path) for path in paths]
+    names = [str(name) for store in stores for name in _listed(store)]
     cameras = {}
     if names:
         for name in dict.fromkeys(names):
-            cameras[name] = _camera(list(stores.values()), paths[0], name, f"_{name}")
+            cameras[name] = _camera(stores, paths[0], name, f"_{name}")
     else:
-        for path, store in stores.items():
+        for path, store in zip(paths, stores, strict=True):
             cameras[path.stem] = _camera([store], path, path.stem, "")
     facts = (
         f"OpenCV YAML, {len(cameras)} cameras",
@@ -57,32 +49,28 @@ def _read(paths: list[Path]) -> RigFile:
     return RigFile(cameras, None, facts)
 
 
-def _open(path: Path) -> Any:
+def _open(path: Path) -> dict[str, Any]:
     try:
-        store = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        store.getNode("names")  # fails where the file is no map
-    except (cv2.error, SystemError) as error:
-        raise unreadable(path, _WANTED, _DAMAGED) from error
-    if not store.isOpened():
-        raise unreadable(path, _WANTED, "not opened")
-    return store
+        return load_opencv_yaml(path)
+    except (OSError, ValueError) as error:
+        raise unreadable(path, _WANTED, error) from error
 
 
-def _listed(store: Any) -> list[str]:
-    node = store.getNode("names")
-    return [] if node.empty() else [node.at(k).string() for k in range(node.size())]
+def _listed(store: dict[str, Any]) -> list[Any]:
+    names = store.get("names")
+    return names if isinstance(names, list) else []
 
 
-def _value(stores: list[Any], keys: tuple[str, ...], suffix: str) -> np.ndarray | None:
+def _value(stores: list[dict[str, Any]], keys: tuple[str, ...], suffix: str) -> np.ndarray | None:
     for key in keys:
         for store in stores:
-            node = store.getNode(f"{key}{suffix}")
-            if not node.empty() and node.mat() is not None:
-                return np.asarray(node.mat(), dtype=float)
+            value = store.get(f"{key}{suffix}")
+            if isinstance(value, np.ndarray) and value.size:
+                return value
     return None
 
 
-def _camera(stores: list[Any], path: Path, name: str, suffix: str) -> RawCamera:
+def _camera(stores: list[dict[str, Any]], path: Path, name: str, suffix: str) -> RawCamera:
     matrix = _value(stores, _MATRIX, suffix)
     # A rotation matrix counts before a rotation vector, which some files hold under `R`.
     rotation = _value(stores, ("Rot",), suffix)
@@ -95,6 +83,8 @@ def _camera(stores: list[Any], path: Path, name: str, suffix: str) -> RawCamera:
             if value is None
         ]
         raise unreadable(path, _WANTED, f"camera {name} lacks {', '.join(lacking)}")
+    if matrix.shape != (3, 3) or rotation.size not in (3, 9) or translation.size != 3:
+        raise unreadable(path, _WANTED, f"camera {name} has matrices of other sizes")
     if rotation.size == 3:
         rotation = np.asarray(cv2.Rodrigues(rotation.reshape(3))[0])
     distortion = _value(stores, _DISTORTION, suffix)
@@ -107,10 +97,10 @@ def _camera(stores: list[Any], path: Path, name: str, suffix: str) -> RawCamera:
     return RawCamera(model, params, pose(rotation.reshape(3, 3), translation), size)
 
 
-def _number(stores: list[Any], keys: tuple[str, ...]) -> int:
+def _number(stores: list[dict[str, Any]], keys: tuple[str, ...]) -> int:
     for store in stores:
         for key in keys:
-            node = store.getNode(key)
-            if not node.empty():
-                return int(node.real())
+            value = store.get(key)
+            if isinstance(value, int | float) and 0 < value < 1e6:
+                return int(value)
     return 0
