@@ -27,7 +27,7 @@ def face() -> FaceModel:
 
 @cache
 def regions() -> GuidedRegions:
-    return regions_of_face(face())
+    return regions_of_face(face(), inner_mm=5.0)
 
 
 @cache

@@ -13,11 +13,11 @@ class RegionsConfig(StageConfig):
     """Which part of the mouth is predicted, and which is trusted (Guided18 figure 2)."""
 
     inner_mm: float = Field(
-        5.0,
+        12.0,
         gt=0,
         le=100,
         description="How far the inner lips reach over the outside of the lips, from the line where "
-        "they meet (mm).",
+        "they meet (mm). All that is wrong of the lips must lie within; the paper's figure shows about 5.",
     )
     inside_mm: float = Field(
         8.0, gt=0, le=100, description="How far the inner lips reach into the mouth (mm)."
@@ -65,9 +65,9 @@ class SketchRefinementConfig(StageConfig):
 class PropagationConfig(StageConfig):
     """From corrected frames to the whole take (Guided18 section 4)."""
 
-    predict: Literal["change", "mouth", "lips"] = Field(
-        "change",
-        description="`change`: how the lips differ from the sequence, so that nothing changes where "
+    predict: Literal["auto", "change", "mouth", "lips"] = Field(
+        "auto",
+        description="`auto`: `mouth` for tracks, `change` for **H**. `change`: how the lips differ from the sequence, so that nothing changes where "
         "nothing was wrong; `mouth`: the same and how the whole mouth region was moved, for a sequence "
         "whose chin and cheeks are wrong, too (the track C); `lips`: the lips themselves, as the paper.",
     )

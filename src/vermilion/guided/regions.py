@@ -14,7 +14,7 @@ from vermilion.geometry.mesh import adjacency, unique_edges
 from vermilion.storage.errors import InputError
 
 #: Defaults, mm along the surface from the lips' inner edge. What other sizes cost: docs/guided.md.
-INNER_MM, INSIDE_MM, MOUTH_MM = 5.0, 8.0, 40.0
+INNER_MM, INSIDE_MM, MOUTH_MM = 12.0, 8.0, 40.0
 
 
 @dataclass(frozen=True)

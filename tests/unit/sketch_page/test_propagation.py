@@ -53,7 +53,7 @@ def test_a_take_that_does_not_follow_the_strokes_says_what_to_change(page, take)
         status = page.get("/api/status").json()
         assert status["propagated"] == list(range(N_FRAMES))
         assert max(status["changed_mm"].values()) < 1e-4
-        assert "guided.regions.inner_mm (now 5)" in status["followed"]
+        assert "guided.regions.inner_mm (now 12)" in status["followed"]
         write_sequence(chunk, take.true_mm)
         status = page.get("/api/status").json()
         assert status["followed"] == ""

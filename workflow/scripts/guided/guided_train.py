@@ -25,10 +25,14 @@ def main(snakemake):
     )
     corrected, base = stacked([RefinedFrame.load(path) for path in inputs.refined])
     stable = np.flatnonzero(face.regions["rigid"])
+    predict = options.predict
+    if predict == "auto":
+        # The chin and the cheeks of a track are at a wrong depth, those of H are not.
+        predict = "mouth" if inputs.get("identity") else "change"
     propagator = LipPropagator(neutral, regions, stable, options.follow_mm)
     propagator.fit(
-        corrected, base, change=options.predict != "lips", with_neutral=options.with_neutral,
-        whole=options.predict == "mouth",
+        corrected, base, change=predict != "lips", with_neutral=options.with_neutral,
+        whole=predict == "mouth",
     )  # fmt: skip
     print(
         f"{len(corrected)} corrected frames, {len(regions.trusted)} trusted and "
