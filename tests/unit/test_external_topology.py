@@ -85,7 +85,7 @@ def test_contours_are_closed_loops_of_edges_and_lips_are_never_mixed(opening):
 
 
 def test_a_mask_whose_mouth_is_a_hole_is_labelled_as_well():
-    tracker, model, own_mm, face = foreign()
+    _, model, own_mm, face = foreign()
     studio = small_studio()
     kept = ~(model.regions["mouth_inner"] | model.regions["eyes"] | model.regions["teeth"])
     ids, triangles = submesh(model.triangles, kept)
