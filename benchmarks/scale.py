@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,7 @@ def run(arguments: argparse.Namespace) -> None:
         with tempfile.TemporaryDirectory(dir=arguments.folder) as folder:
             rows.append(measured(Path(folder), frames, arguments.subjects, arguments.chunk))
             print_table(rows)
-    for before, after in zip(rows, rows[1:], strict=False):
+    for before, after in pairwise(rows):
         growth = after["plan_core_s"] / before["plan_core_s"] / (after["jobs"] / before["jobs"])
         print(
             f"{before['frames']} > {after['frames']} frames: planning a job costs {growth:.2f} times as much"
