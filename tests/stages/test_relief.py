@@ -65,6 +65,7 @@ def run_stage(root, paths):
         made = {
             "meshes": out / path.name,
             "maps": out / "normals" / path.stem,
+            "displacements": out / "displacements" / path.stem,
             "quality": out / f"quality{path.stem}.tsv",
             "overlay": out / f"overlay{path.stem}.png",
             "start": out / f"before{path.stem}.tsv",

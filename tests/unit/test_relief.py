@@ -163,6 +163,20 @@ def test_normal_map_is_flat_without_relief_and_leans_with_it():
     assert maps.draw(points, rows)[16:48, 16:48, 1].mean() < 0.47  # green is up
 
 
+def test_displacement_map_is_the_height_of_the_relief():
+    topology, points = dome()
+    uv = (points[:, :2] + 30) / 60
+    maps = NormalMap(topology, uv, 64)
+    height = bump(points)
+    raised = points + height[:, None] * vertex_normals(points, topology.triangles)
+    drawn = maps.draw_displacement(points, raised)
+    middle = (np.arange(64) + 0.5) / 64 * 60 - 30
+    at = np.column_stack([part.ravel() for part in np.meshgrid(middle, -middle)])
+    wanted = bump(np.column_stack([at, np.zeros(len(at))])).reshape(64, 64)
+    assert np.abs(drawn - wanted)[8:56, 8:56].max() < 0.05 * height.max()
+    assert np.abs(maps.draw_displacement(points, points)).max() < 1e-6
+
+
 def test_normals_of_a_known_bump_give_the_bump():
     topology, points = dome()
     normals = vertex_normals(points, topology.skin)

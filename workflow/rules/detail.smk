@@ -151,7 +151,7 @@ rule relief:
 
 
 rule relief_meshes:
-    """Relief with averaged normals, as meshes and normal maps: detail/relief/{chunk}.npy."""
+    """Relief with averaged normals, as meshes, normal and displacement maps: detail/relief/{chunk}.npy."""
     input:
         images=mono_images,
         tracker=tracker_of,
@@ -162,6 +162,7 @@ rule relief_meshes:
     output:
         meshes=P.relief_meshes,
         maps=directory(P.normal_maps),
+        displacements=directory(P.displacement_maps),
         quality=P.relief_quality,
         overlay=P.relief_overlay,
         start=P.residuals.replace("{step}", "before_relief"),

@@ -123,6 +123,7 @@ class P:
     relief = _TAKE + "/detail/relief/frames/{chunk}.npz"
     relief_meshes = _TAKE + "/detail/relief/{chunk}.npy"
     normal_maps = _TAKE + "/detail/relief/normals/{chunk}"
+    displacement_maps = _TAKE + "/detail/relief/displacements/{chunk}"
     relief_quality = _TAKE + "/detail/relief/quality/{chunk}.tsv"
     relief_overlay = _TAKE + "/detail/relief/overlay/{chunk}.png"
 

@@ -1,4 +1,4 @@
-"""Meshes with relief, their normals averaged over a window of frames; normal maps, residuals."""
+"""Meshes with relief, their normals averaged over a window of frames; maps of normals and displacements, residuals."""
 
 import numpy as np
 
@@ -42,7 +42,8 @@ def main(snakemake):
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
     shown = set(evenly_spaced(len(params.frames), cfg["detail.relief.overlay_frames"]).tolist())
     meshes, quality, panels = [], [], []
-    with atomic_folder(snakemake.output.maps) as folder:
+    heights = snakemake.output.displacements
+    with atomic_folder(snakemake.output.maps) as folder, atomic_folder(heights) as raised:
         for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):
             smooth = scene.fine(frame)
             span = fit.piece_span(frame)  # normals are not averaged across a cut
@@ -50,6 +51,8 @@ def main(snakemake):
             drawn = maps.draw(smooth, mesh)
             names = zip("RGB", np.moveaxis(drawn, 2, 0), strict=True)
             write_channels(folder / f"{frame:06d}.exr", dict(names))
+            height = maps.draw_displacement(smooth, mesh)
+            write_channels(raised / f"{frame:06d}.exr", {"Y": height})
             meshes.append(mesh)
             row, image, errors = residuals(scene, light, reader, frame, smooth, mesh)
             quality.append(row)

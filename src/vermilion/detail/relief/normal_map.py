@@ -1,4 +1,4 @@
-"""Tangent-space normal maps: the mesh with relief against the smooth one, in texture space."""
+"""Tangent-space normal and displacement maps: the mesh with relief against the smooth one, in texture space."""
 
 from __future__ import annotations
 
@@ -41,6 +41,17 @@ class NormalMap:
         local = np.einsum("vij,vj->vi", basis, shaped)
         found = normalised(interpolate(self._hits, self._skin, local))
         return np.where(self._hits.hit[..., None], 0.5 + 0.5 * found, [0.5, 0.5, 1.0])
+
+    def draw_displacement(self, smooth_mm: np.ndarray, refined_mm: np.ndarray) -> np.ndarray:
+        """Map (size_px, size_px) in mm: how far the relief lies outwards along the smooth mesh's normal; 0 off the skin.
+
+        Args:
+            smooth_mm, refined_mm: (V', 3) as in `draw`.
+        """
+        normals = vertex_normals(smooth_mm, self._triangles)
+        outwards = ((refined_mm - smooth_mm) * normals).sum(axis=1, keepdims=True)
+        found = interpolate(self._hits, self._skin, outwards)[..., 0]
+        return np.where(self._hits.hit, found, 0.0)
 
     def _along_u(self, vertices_mm: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Unit tangents (V', 3) along increasing u."""
