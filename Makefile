@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run cameras plates sketch doctor report verify test test-quick test-latest test-interchange lint format docs reference clean
+.PHONY: help setup demo lips run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -89,6 +89,10 @@ test-interchange: $(READY) $(VENV)-interchange.ready
 $(VENV)-interchange.ready: requirements.interchange.lock tools/setup_interchange.sh | $(READY)
 	tools/setup_interchange.sh $(VENV)-interchange $(PYTHON)
 	@touch $@
+
+# The malformed inputs with more seeds than in `make test`; about a minute of one core for 20.
+test-faults: setup
+	VERMILION_FAULT_SEEDS=$${VERMILION_FAULT_SEEDS:-20} $(BIN)/python -m pytest -p no:cacheprovider tests/faults
 
 # A real Slurm of two nodes on this machine; needs root. VERMILION_TEST_SLURM=all compares a whole run.
 test-slurm: setup

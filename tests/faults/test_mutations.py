@@ -119,11 +119,11 @@ def test_changed_bytes_give_a_value_or_a_sentence(kind, tmp_path):
         folder.mkdir()
         path = Path(make(folder, rng))
         path.write_bytes(mutate(path.read_bytes(), rng))
-        start = time.monotonic()
+        start = time.process_time()
         try:
             read(path)
         except VermilionError as error:
             assert len(str(error)) < MOST_LETTERS, f"seed {seed}: {str(error)[:300]}"
         except Exception as error:
             pytest.fail(f"seed {seed}: {type(error).__name__}: {error}")
-        assert time.monotonic() - start < MOST_SECONDS, f"seed {seed}"
+        assert time.process_time() - start < MOST_SECONDS, f"seed {seed}"
