@@ -8,6 +8,7 @@ import pytest
 from tests.unit.mouths import draw_mouth
 from vermilion.contours.holes import hole_edges
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
+from vermilion.contours.ridges import InnerCues
 
 STEP = 0.5
 PLACES = STEP * np.arange(-60, 21)
@@ -68,3 +69,21 @@ def test_a_border_far_outside_a_hole_comes_to_its_edge():
     border = label.inner.dense(1.0)
     lower = border[(border[:, 1] > CENTRE[1]) & (np.abs(border[:, 0] - CENTRE[0]) < 3), 1].mean()
     assert below.argmax() + 0.5 == pytest.approx(lower, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("teeth", "expected"), [((-5, -1), True), ((1, 5), False), ((-30, -20), False)]
+)
+def test_a_dark_line_ends_a_lip_where_teeth_lie_inside_it_not_where_they_lie_outside(
+    teeth, expected
+):
+    """Between a tongue and the lower teeth is a dark line as well."""
+    angle = np.linspace(np.pi, 3 * np.pi, 80, endpoint=False)
+    curve = CENTRE + 60 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    y, x = np.mgrid[0:240, 0:240] + 0.5
+    outside = np.hypot(x - CENTRE[0], y - CENTRE[1]) - 60
+    plane = ((outside > teeth[0]) & (outside < teeth[1])).astype(np.float32)
+    cues = InnerCues(plane, plane, plane, plane, plane)
+    normals = (curve - CENTRE) / 60
+    found = LandmarkRidgeDetector()._before_teeth(curve, normals, cues, STEP, 4)
+    assert (found[:, 4] == expected).all()

@@ -128,7 +128,7 @@ class ContourDetectorConfig(StageConfig):
         "from them, and `ridge_reach` and `track.inner_reach` do not count.",
     )
     lips_shade: float = Field(
-        0.7,
+        1.0,
         ge=0,
         le=2,
         description="Where the lips of dense landmarks are the start: what the dark line between a lip and "

@@ -83,7 +83,7 @@ class InnerCues:
         contact: dark lines, as where lips touch.
         flesh: where the image is lips, gums or tongue, 0 or 1.
         lip: 1 inside the outer border.
-        teeth: 1 on and just beside teeth: light places without the lips' colour.
+        teeth: 1 on teeth: light places without the lips' colour.
     """
 
     lightness: np.ndarray
@@ -116,7 +116,7 @@ class RidgeDetector(ContourDetector):
     reach: float = 0.08
     edge_weight: float = 4.0
     stiffness: float = 6.0
-    lips_shade: float = 0.7
+    lips_shade: float = 1.0
 
     @classmethod
     def of(cls, section, reach: float, **others: float) -> Self:
@@ -162,7 +162,8 @@ class RidgeDetector(ContourDetector):
             line = np.minimum(line / max(np.percentile(line.max(axis=1), 50), 1e-6), 1.0)
             fall += LINE_SHARE * near * (line - fall)
             if self.lips_shade:
-                fall += self.lips_shade * (1 - near) * line * sampled(inside.teeth, points)
+                before = self._before_teeth(curve, normals, inside, step_px, count)
+                fall += self.lips_shade * (1 - near) * line * before
             crease, beyond = self._creases(curve, normals, inside, step_px, count)
             fall += (1.0 - near) * (crease - beyond * fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
@@ -170,6 +171,18 @@ class RidgeDetector(ContourDetector):
         rows = np.arange(len(curve))
         found = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
         return found, np.minimum(fall[rows, chosen], 1.0)
+
+    def _before_teeth(
+        self, curve: np.ndarray, normals: np.ndarray, inside: InnerCues, step_px: float, count: int
+    ) -> np.ndarray:
+        """Whether teeth lie within `TEETH_PX` inside and none outside of each place at a curve, (n, T) 0 or 1."""
+        reach = round(TEETH_PX / step_px)
+        places = step_px * np.arange(-count - reach, count + reach + 1)
+        points = curve[:, None] + places[None, :, None] * normals[:, None]
+        seen: np.ndarray = np.cumsum(sampled(inside.teeth, points) > 0.5, axis=1)
+        here = seen[:, reach : reach + 2 * count + 1]
+        within, beyond = here > seen[:, : 2 * count + 1], seen[:, 2 * reach :] > here
+        return np.where(within & ~beyond, 1.0, 0.0)
 
     def to_holes(self, curve: np.ndarray, inside: InnerCues, step_px: float) -> np.ndarray:
         """The inner border's `curve` (n, 2) moved to the edge of the dark beside the lips, where there is one."""
@@ -266,7 +279,5 @@ def cues_of(colours: np.ndarray, flesh: np.ndarray, lip: np.ndarray) -> InnerCue
     seen = (lip > 0.5) & (flesh > 0.5)
     usual = np.median(colours[0][seen]) if seen.any() else 1.0
     teeth = ((flesh < 0.5) & (lip > 0.5) & (colours[0] > TEETH * usual)).astype(np.uint8)
-    teeth = cv2.morphologyEx(teeth, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    reach = 2 * TEETH_PX + 1
-    beside = cv2.dilate(teeth, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
-    return InnerCues(colours[0], dark_lines(colours[0]), flesh, lip, beside.astype(np.float32))
+    teeth = cv2.morphologyEx(teeth, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).astype(np.float32)
+    return InnerCues(colours[0], dark_lines(colours[0]), flesh, lip, teeth)
