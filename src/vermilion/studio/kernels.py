@@ -14,7 +14,7 @@ SKIN, MOUTH, TEETH, EYE = 0, 1, 2, 3
 MASK = 63  # noise volumes are 64 cells wide
 
 
-@njit(cache=True, fastmath=True, inline="always")
+@njit(cache=True, fastmath=True)
 def _smoothstep(low, high, value):
     t = min(max((value - low) / (high - low), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
@@ -34,7 +34,7 @@ def _noise(volume, x, y, z):
     return (a * (1 - ty) + b * ty) * (1 - tx) + (c * (1 - ty) + d * ty) * tx
 
 
-@njit(cache=True, fastmath=True, inline="always")
+@njit(cache=True, fastmath=True)
 def _octave(volume, x, y, z, cell, footprint, turn):
     """Noise of blobs some three cells wide, faded out where a pixel is too wide for it."""
     fade = math.exp(-0.35 * (footprint / cell) ** 2)

@@ -57,11 +57,13 @@ def render(scene: Scene, vertices_mm: np.ndarray, cameras: dict[str, Camera]) ->
     caster = RayCaster(vertices, scene.triangles)
     normals = vertex_normals(vertices, scene.triangles)
     views = {name: _look_through(scene, caster, normals, cam) for name, cam in cameras.items()}
-    needed = np.zeros(len(vertices), dtype=bool)
+    # One more: the triangle of rays that hit nothing is -1.
+    seen = np.zeros(len(scene.triangles) + 1, dtype=bool)
     for view in views.values():
         for hits in (view.hits, view.edge_hits):
-            seen = np.unique(hits.triangle)
-            needed[scene.triangles[seen[seen >= 0]]] = True
+            seen[hits.triangle.ravel()] = True
+    needed = np.zeros(len(vertices), dtype=bool)
+    needed[scene.triangles[seen[:-1]]] = True
     light = bake_light(
         caster,
         vertices,
