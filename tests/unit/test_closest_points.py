@@ -130,7 +130,7 @@ def test_nearest_point_is_exact_on_a_mesh_with_very_long_triangles():
     everything = np.tile(np.arange(len(surface.corners)), (len(points), 1))
     exact, none = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     closest_of(
-        points, np.zeros_like(points), none, everything, surface.corners, surface.normals,
+        points, np.zeros_like(points), none, np.arange(len(points)), everything, surface.corners, surface.normals,
         np.zeros(len(surface.corners), np.int64), -2.0, exact, none.copy(),
         np.zeros_like(points),
     )  # fmt: skip

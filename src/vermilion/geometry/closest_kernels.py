@@ -116,16 +116,17 @@ def search(  # pragma: no cover - compiled
 
 @numba.njit(cache=True)
 def closest_of(  # pragma: no cover - compiled
-    points: np.ndarray, normals: np.ndarray, sides: np.ndarray,
+    points: np.ndarray, normals: np.ndarray, sides: np.ndarray, rows: np.ndarray,
     candidates: np.ndarray, corners: np.ndarray, face_normals: np.ndarray, face_sides: np.ndarray,
     min_cosine: float, best: np.ndarray, triangle: np.ndarray, barycentric: np.ndarray,
 ) -> None:  # fmt: skip
     """Keep in `best`, `triangle`, `barycentric` the nearest of the candidate triangles."""
-    for row in range(len(points)):
+    for index in range(len(rows)):
+        row = rows[index]
         px, py, pz = points[row]
         nx, ny, nz = normals[row]
         least = best[row] ** 2
-        for t in candidates[row]:
+        for t in candidates[index]:
             if sides[row] != 0 and face_sides[t] != 0 and sides[row] != face_sides[t]:
                 continue
             if min_cosine > -1.0:

@@ -11,7 +11,7 @@ from vermilion.geometry.mesh import triangle_areas, triangle_normals
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.geometry.triangle_tree import TriangleTree
 
-_CONDITIONAL_CANDIDATES = 48
+_FIRST_CANDIDATES, _CONDITIONAL_CANDIDATES = 8, 48
 _SIZE_QUANTILES = (0.25, 0.5, 0.75, 0.9, 0.98)
 
 
@@ -34,8 +34,8 @@ class Surface:
         return TriangleTree(self.corners)
 
     @cached_property
-    def _groups(self) -> list[tuple[np.ndarray, cKDTree]]:
-        """Triangles of like size, and a tree of their centroids."""
+    def _groups(self) -> list[tuple[np.ndarray, cKDTree, float]]:
+        """Triangles of like size, a tree of their centroids, the largest distance of a corner from its."""
         centroids = self.corners.mean(axis=1)
         radii = np.linalg.norm(self.corners - centroids[:, None], axis=2).max(axis=1)
         # Candidates are searched for among triangles of like size: one large triangle in a tree of
@@ -43,7 +43,7 @@ class Surface:
         order = np.argsort(radii, kind="stable")
         bounds = np.searchsorted(radii[order], np.quantile(radii, _SIZE_QUANTILES), side="right")
         groups = (members for members in np.split(order, np.unique(bounds)) if len(members))
-        return [(members, cKDTree(centroids[members])) for members in groups]
+        return [(rows, cKDTree(centroids[rows]), float(radii[rows].max())) for rows in groups]
 
     def closest(
         self,
@@ -88,13 +88,20 @@ class Surface:
             owned = np.asarray(triangle_sides, np.int64)[self.ids]
         best = np.full(len(points), np.inf)
         triangle, barycentric = np.full(len(points), -1, np.int64), np.zeros((len(points), 3))
-        for members, tree in self._groups:
-            k = min(_CONDITIONAL_CANDIDATES, len(members))
-            near = members[tree.query(points, k=k)[1].reshape(len(points), k)]
-            closest_of(
-                points, given, wanted, near, self.corners, self.normals, owned,
-                cosine, best, triangle, barycentric,
-            )  # fmt: skip
+        rows = [np.arange(len(points))] * len(self._groups)
+        for most in (_FIRST_CANDIDATES, _CONDITIONAL_CANDIDATES):
+            for index, (members, tree, radius) in enumerate(self._groups):
+                k = min(most, len(members))
+                if len(rows[index]) == 0:
+                    continue
+                away, near = tree.query(points[rows[index]], k=k)
+                closest_of(
+                    points, given, wanted, rows[index], members[near.reshape(-1, k)], self.corners,
+                    self.normals, owned, cosine, best, triangle, barycentric,
+                )  # fmt: skip
+                # Those for which a triangle further down the list could be nearer.
+                is_open = best[rows[index]] > away.reshape(-1, k)[:, -1] - radius
+                rows[index] = rows[index][is_open & (k < len(members))]
         triangle[triangle >= 0] = self.ids[triangle[triangle >= 0]]
         return SurfacePoints(triangle, barycentric, best)
 
