@@ -16,19 +16,23 @@ import pytest  # noqa: E402
 gc.set_threshold(50_000)
 
 ROOT = Path(__file__).resolve().parents[1]
-#: The file that makes the tiny run begins. Files that wait for that run come last, the longest of them first.
+#: The file that makes the tiny run begins. Files that wait for that run come last, the longest of them first;
+#: a process with one or two tests left takes a further file at once: two long single tests do not stand together.
 _BEGIN = "test_faults"
-_END = ("test_chunks", "test_failed_takes", "test_guided", "test_reruns")
+_LONG = ("test_chunks", "test_guided", "test_failed_takes", "test_reruns")
 
 
 def pytest_collection_modifyitems(items):
     """Order the files for processes that each take one at a time (`-n 2 --dist loadfile`)."""
+    waiting = {item.path for item in items if "finished" in item.fixturenames}
 
     def place(item):
+        if item.path not in waiting:
+            return 0
         name = item.path.stem
-        if name == _BEGIN or item.path.parent.name != "workflow":
-            return -1 if name == _BEGIN else 0
-        return 1 + _END.index(name) if name in _END else 0
+        if name == _BEGIN:
+            return -1
+        return 1 + (_LONG.index(name) if name in _LONG else len(_LONG))
 
     items.sort(key=place)
 
