@@ -12,6 +12,7 @@ from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
 from vermilion.tracking.identity.landmark_identity import IdentityFit
 from vermilion.tracking.identity.lip_offset import lip_offset
 from vermilion.tracking.identity.sampling import tells_lips
+from vermilion.tracking.image_fit.take import near_lips
 from vermilion.tracking.result import Identity
 
 LOWER_MM = 3.0
@@ -50,6 +51,8 @@ def test_the_meshes_of_a_person_have_their_own_lips(model, fit):
         plain.vertices(model, weights), model.vertices(fit.identity, weights)
     )
     lower = plain.vertices(model, weights) - own.vertices(model, weights)
+    assert own.has_own_lips(model)
+    assert not plain.has_own_lips(model)
     np.testing.assert_allclose(lower[0, model.landmarks[MOUTH], 1], LOWER_MM, atol=0.4)
 
 
@@ -61,3 +64,12 @@ def test_dense_landmarks_alone_tell_lips(tmp_path, landmark_set, expected):
     )
     track.save(tmp_path / "landmarks.npz")
     assert tells_lips([str(tmp_path / "landmarks.npz")]) is expected
+
+
+def test_samples_on_and_beside_the_lips_are_found(model):
+    """With own lips the image's samples there do not count: teeth would be taken for lips."""
+    neutral = model.neutral_of(np.zeros(model.n_identities))
+    found = near_lips(model, neutral, neutral)
+    assert found[model.regions["vermilion_lower"]].all()
+    chin = neutral[:, 1] < neutral[model.landmarks[MOUTH], 1].min() - 8.0
+    assert not found[chin].any()

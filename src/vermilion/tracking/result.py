@@ -72,6 +72,10 @@ class Identity:
             places=places,
         )
 
+    def has_own_lips(self, model: FaceModel) -> bool:
+        """Whether the neutral has a mouth that the model cannot show, known from dense landmarks."""
+        return not np.allclose(self.neutral_mm, model.neutral_of(self.identity), atol=1e-3)
+
     def vertices(self, model: FaceModel, weights: np.ndarray) -> np.ndarray:
         """The person's meshes (..., V, 3) mm of blend weights (..., K), head frame."""
         own = self.neutral_mm - model.neutral_of(self.identity)

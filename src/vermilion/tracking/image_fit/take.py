@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vermilion.appearance.estimate import Appearance, SampleObservations, estimate_appearance
 from vermilion.appearance.sampled_face import SampledFace
@@ -29,6 +30,9 @@ from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.landmark_fit.turned import as_seen_turned, turned_frames
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import landmark_fit_settings
+
+#: Samples so near to the lips do not count where landmarks tell the lips.
+BESIDE_LIPS_MM = 6.0
 
 
 class StartFiles(Protocol):
@@ -161,14 +165,27 @@ class TakeStart:
         rotation = rotation_matrix(x[:3]) @ self.reference
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
+        trust = visible_trust(self.model, self.vertices(x), points, normals)
+        if self.identity.has_own_lips(self.model):
+            trust[near_lips(self.model, self.identity.neutral_mm, face.neutral_mm)] = 0.0
         return FrameView(
             image_pyramid(image, self.camera, points, pixel_mm, levels),
             focal,
-            visible_trust(self.model, self.vertices(x), points, normals),
+            trust,
             LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
             x,
             self.reference,
         )
+
+
+def near_lips(model: FaceModel, neutral_mm: np.ndarray, samples_mm: np.ndarray) -> np.ndarray:
+    """(N,) bool: samples (N, 3) of a neutral (V, 3) on or beside its lips, mm.
+
+    Teeth, tongue and shade beside real lips are taken for lips by the comparison with the image, which then
+    draws the lower lip over them; landmarks that draw lips as people have them say it better.
+    """
+    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
+    return cKDTree(neutral_mm[lips]).query(samples_mm)[0] < BESIDE_LIPS_MM
 
 
 def observe_samples(
