@@ -13,6 +13,7 @@ from tests.heads import small_tracker
 from vermilion.faces.procedural import tracker_model
 from vermilion.geometry.mesh import Mesh, unique_edges
 from vermilion.landmarks.detector import Landmarks
+from vermilion.scan.fit import standard_unit
 from vermilion.scan.landmarks import (
     ScanLandmarks,
     find_landmarks,
@@ -121,12 +122,12 @@ def test_expressions_of_the_person_are_those_of_the_model_but_for_the_shape(gene
         assert away.mean() < 0.15 * size.max()
 
 
-def test_a_moved_turned_and_scaled_scan_gives_the_same_model(generic, still):
-    _, still = still
+def test_a_moved_turned_and_scaled_scan_gives_the_same_model(generic):
+    """In units that are none: that of a standard unit is kept."""
+    _, still = fitted(generic, scale=0.37)
     _, away = fitted(generic, scale=0.013, turn=(70, -130, 20), shift=(3, 9, -20))
-    assert away.fit.head_from_scan.scale == pytest.approx(
-        still.fit.head_from_scan.scale / 0.013, rel=1e-6
-    )
+    share = away.fit.head_from_scan.scale / still.fit.head_from_scan.scale
+    assert share == pytest.approx(0.37 / 0.013, rel=1e-6)
     np.testing.assert_allclose(away.model.neutral_mm, still.model.neutral_mm, atol=1e-3)
     np.testing.assert_allclose(away.model.expressions_mm, still.model.expressions_mm, atol=1e-3)
 
@@ -261,3 +262,27 @@ def test_a_real_head_lying_on_its_back_is_met_within_half_a_millimetre(data_root
     assert figures["distance_mean_mm"] < 0.5
     assert figures["met_share"] > 0.95
     assert figures["unit_mm"] == pytest.approx(55.6 / 7.0, rel=0.08)
+
+
+@pytest.mark.parametrize(
+    ("estimated_mm", "unit_mm"),
+    [
+        (1.07, 1.0),
+        (0.93, 1.0),
+        (9.4, 10.0),
+        (25.0, 25.4),
+        (1080.0, 1000.0),
+        (2.7, None),
+        (55.6, None),
+    ],
+)
+def test_a_unit_near_a_standard_one_is_that_one(estimated_mm, unit_mm):
+    assert standard_unit(estimated_mm) == unit_mm
+
+
+@pytest.mark.slow
+def test_a_large_head_in_millimetres_stays_large(generic):
+    large = 1.06 * person(generic)
+    scan = as_scan(large, generic.triangles)
+    made = personal_model(generic, scan, ScanLandmarks(large[generic.landmarks], np.zeros(66)))
+    assert made.figures()["unit_mm"] == 1.0

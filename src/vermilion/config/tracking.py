@@ -252,7 +252,8 @@ class ScanConfig(StageConfig):
         None,
         gt=0,
         le=1e6,
-        description="Length of a unit in the file (mm). Empty: estimated from the size of the model's head.",
+        description="Length of a unit in the file (mm). Empty: that of mm, cm, inch, dm or m in which the head is as large as "
+        "a head, else estimated from the size of the model's head.",
     )
     finest_mm: float = Field(
         4.0,

@@ -19,6 +19,27 @@ _SIGMA_MM, _BROWS_MM, _JAW_MM, _CLOSED_LIDS_MM = 2.5, 4.0, 12.0, 20.0
 _WEIGHT_SIGMA, _ROBUST_SIGMAS, _ROUNDS = 0.1, 2.0, 20
 
 
+#: Units that scanners write: millimetre, centimetre, inch, decimetre, metre; and how far from one, as a
+#: share, a unit may seem by the size of the head: people's heads differ by that.
+_UNITS_MM, _UNIT_SHARE = (1.0, 10.0, 25.4, 100.0, 1000.0), 0.12
+
+
+def standard_unit(estimated_mm: float) -> float | None:
+    """The unit that a scan is in, by the one in which its head is as large as the model's.
+
+    One that is near a standard unit is that unit, or everybody's head would have one size.
+
+    Args:
+        estimated_mm: length of the unit in which the head has the model's size.
+
+    Returns:
+        length of the standard unit (mm); None: it is none.
+    """
+    ratios = np.log(np.asarray(_UNITS_MM) / estimated_mm)
+    nearest = int(np.argmin(np.abs(ratios)))
+    return _UNITS_MM[nearest] if abs(ratios[nearest]) < np.log1p(_UNIT_SHARE) else None
+
+
 @dataclass(frozen=True)
 class ScanFit:
     """The head frame of a scan, and the model that looks like it.

@@ -11,7 +11,7 @@ from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, boundary_edges, triangle_areas, vertex_areas
 from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
-from vermilion.scan.fit import ScanFit, fit_landmarks
+from vermilion.scan.fit import ScanFit, fit_landmarks, standard_unit
 from vermilion.scan.landmarks import LEAST_GIVEN, ScanLandmarks
 from vermilion.scan.transfer import DeformationTransfer
 from vermilion.storage.errors import InputError
@@ -92,7 +92,7 @@ def personal_model(
         generic: the tracker's model.
         scan: in its own frame and unit.
         landmarks: on it.
-        unit_mm: length of the scan's unit; None: from the model.
+        unit_mm: length of the scan's unit; None: a standard one, or from the model (`standard_unit`).
         least_opening: lower bound of the weight of jawOpen; the tracker's neutral has parted lips,
             so that closed ones are a weight below zero.
         closed_eyes: whether the scan's lids are shut.
@@ -111,6 +111,9 @@ def personal_model(
         )
     bounds = {"jawOpen": (least_opening, 1.0)}
     fit = fit_landmarks(generic, landmarks, unit_mm, bounds, closed_eyes)
+    known_unit = standard_unit(fit.head_from_scan.scale) if unit_mm is None else None
+    if known_unit is not None:
+        fit = fit_landmarks(generic, landmarks, known_unit, bounds, closed_eyes)
     in_head = scan.with_vertices(fit.head_from_scan.apply(scan.vertices_mm))
     registered, met = _registered(generic, fit, in_head, finest_mm)
     area = vertex_areas(generic.vertices(fit.identity, fit.weights), generic.triangles)
