@@ -1,4 +1,4 @@
-"""Planning at the size of a facility: jobs, seconds and memory of the workflow's graph against its frames.
+"""Planning at a facility's size: jobs, seconds and memory of the graph against its frames.
 
 For every size a folder of captures is made whose images are empty files: only the graph is made, no job runs.
 Prints, for each: jobs; core seconds and memory of planning everything, of a run in which nothing is to be
