@@ -10,12 +10,15 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import MOUTH
 from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
 from vermilion.tracking.identity.landmark_identity import IdentityFit
-from vermilion.tracking.identity.lip_offset import lip_offset
+from vermilion.tracking.identity.lip_offset import OwnLips, lip_offset
 from vermilion.tracking.identity.sampling import tells_lips
 from vermilion.tracking.image_fit.take import near_lips
 from vermilion.tracking.result import Identity
 
 LOWER_MM = 3.0
+
+
+PRIOR = OwnLips(range_mm=10.0, sigma_mm=2.0, noise_mm=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +37,7 @@ def fit(model):
 
 def test_the_lips_move_to_where_they_are_seen_and_the_rest_stays(model, fit):
     neutral = model.neutral_of(fit.identity)
-    moved = lip_offset(model, neutral, fit.landmark_offset_mm)
+    moved = lip_offset(model, neutral, fit.landmark_offset_mm, PRIOR)
     np.testing.assert_allclose(
         moved[model.landmarks[MOUTH]], fit.landmark_offset_mm[MOUTH], atol=0.4
     )
@@ -45,7 +48,7 @@ def test_the_lips_move_to_where_they_are_seen_and_the_rest_stays(model, fit):
 
 
 def test_the_meshes_of_a_person_have_their_own_lips(model, fit):
-    own, plain = (Identity.of(fit, model, [], own_lips=on) for on in (True, False))
+    own, plain = (Identity.of(fit, model, [], own_lips=on) for on in (PRIOR, None))
     weights = np.full((1, model.n_expressions), 0.3)
     np.testing.assert_allclose(
         plain.vertices(model, weights), model.vertices(fit.identity, weights)

@@ -112,6 +112,26 @@ class IdentityImagesConfig(ColourTermConfig):
     iterations: int = Field(4, ge=1, le=50, description="Gauss-Newton steps of a round (count).")
 
 
+class OwnLipsConfig(StageConfig):
+    """The person's own mouth, where landmarks are dense (`mediapipe`).
+
+    The neutral's mouth moves to where the lips are seen on the whole, as the tracker's identities have no such
+    lips. The 66 landmarks of other detectors are off by much the same for everybody, so it does not count with
+    them.
+    """
+
+    enabled: bool = Field(True, description="Whether the neutral takes the person's own mouth.")
+    range_mm: float = Field(
+        10.0, gt=0.1, le=100, description="Range over which neighbouring skin moves along (mm)."
+    )
+    sigma_mm: float = Field(
+        2.0, gt=0.01, le=50, description="Deviation of a mouth from the tracker's identities (mm)."
+    )
+    noise_mm: float = Field(
+        0.3, gt=0.01, le=50, description="Deviation of a landmark's mean offset over a take (mm)."
+    )
+
+
 class IdentityConfig(StageConfig):
     """The person, from a few frames of all of a subject's takes."""
 
@@ -122,12 +142,7 @@ class IdentityConfig(StageConfig):
         LandmarkBiases,
         "Deviation of the person's detected landmarks from the model's, constant over all frames.",
     )
-    own_lips: bool = Field(
-        True,
-        description="Where landmarks are dense (`mediapipe`): move the neutral's mouth to where the lips are "
-        "seen on the whole, as the tracker's identities have no such lips. The 66 landmarks of other detectors "
-        "are off by much the same for everybody, so it does not count with them.",
-    )
+    own_lips: OwnLipsConfig = section(OwnLipsConfig, "The person's own mouth (dense landmarks).")
     neutral_weight_sigma: float = Field(
         0.03,
         gt=0.001,

@@ -81,13 +81,7 @@ def _chosen(found: list, request: Request) -> tuple:
     else:
         moving = [entry for entry in found if entry[2].getNumSamples() > 1]
         chosen = found if len(found) == 1 else moving
-    if len(chosen) != 1:
-        raise request.error(
-            f"{len(chosen)} meshes of {[entry[0] for entry in found]}",
-            "one mesh, the face",
-            "Name it in `tracking.external.mesh`.",
-        )
-    return chosen[0]
+    return request.only(chosen, [entry[0] for entry in found])
 
 
 def _times(schema: Any) -> list[float]:

@@ -193,13 +193,7 @@ def _chosen(file: _File) -> int:
             if any("targets" in part for part in meshes[nodes[k]["mesh"]]["primitives"])
         ]
         found = with_mesh if len(with_mesh) == 1 else found
-    if len(found) != 1:
-        raise request.error(
-            f"{len(found)} meshes of {names}",
-            "one mesh, the face",
-            "Name its node in `tracking.external.mesh`.",
-        )
-    return found[0]
+    return request.only(found, names)
 
 
 def _geometry(file: _File, parts: list[dict]) -> tuple[np.ndarray, np.ndarray, Polygons]:

@@ -58,6 +58,16 @@ class Request:
         """The error of this file."""
         return InputError(found, expected, hint, **{"path": self.path, **self.place, **more})
 
+    def only(self, found: Sequence[Any], names: Sequence[str]) -> Any:
+        """The one mesh of those `found` in a file whose meshes are `names`. Raises InputError for none or several."""
+        if len(found) != 1:
+            raise self.error(
+                f"{len(found)} meshes of {list(names)}",
+                "one mesh, the face",
+                "Name it in `tracking.external.mesh`.",
+            )
+        return found[0]
+
     def absent(self, present: Iterable[int]) -> dict[int, str]:
         """Frames that the file does not have, with the reason.
 

@@ -13,7 +13,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.landmarks.sets import IBUG66, LandmarkSet
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.tracking.identity.landmark_identity import IdentityFit, TakeSample
-from vermilion.tracking.identity.lip_offset import lip_offset
+from vermilion.tracking.identity.lip_offset import OwnLips, lip_offset
 from vermilion.tracking.landmark_fit.expression import HeadMotion
 from vermilion.tracking.places import LandmarkPlaces
 
@@ -53,15 +53,15 @@ class Identity:
         model: FaceModel,
         samples: Sequence[TakeSample],
         places: LandmarkPlaces | None = None,
-        own_lips: bool = False,
+        own_lips: OwnLips | None = None,
     ) -> Identity:
         """Of a fit to the samples of some takes; `places` as for the fit.
 
-        `own_lips`: the neutral has the person's own mouth, as far as the landmark offsets tell it.
+        `own_lips`: the neutral has the person's own mouth, as far as the landmark offsets tell it; None: the model's.
         """
         neutral = model.neutral_of(fit.identity)
-        if own_lips:
-            neutral = neutral + lip_offset(model, neutral, fit.landmark_offset_mm)
+        if own_lips is not None:
+            neutral = neutral + lip_offset(model, neutral, fit.landmark_offset_mm, own_lips)
         return cls(
             identity=fit.identity,
             neutral_mm=neutral,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from vermilion.tracking.identity.landmark_identity import IdentitySettings
+from vermilion.tracking.identity.lip_offset import OwnLips
 from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.landmark_fit.observation import LandmarkNoise
 
@@ -34,3 +35,10 @@ def identity_settings(fit: dict[str, Any], identity: dict[str, Any]) -> Identity
         neutral_weight_sigma=identity["neutral_weight_sigma"],
         focal_sigma=identity["focal_sigma"],
     )
+
+
+def own_lips_settings(identity: dict[str, Any], tells_lips: bool) -> OwnLips | None:
+    """Settings of the section `tracking.identity.own_lips`; None where it is off, or landmarks do not tell lips."""
+    chosen = dict(identity["own_lips"])
+    enabled = chosen.pop("enabled")
+    return OwnLips(**chosen) if enabled and tells_lips else None

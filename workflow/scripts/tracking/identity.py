@@ -5,7 +5,7 @@ from vermilion.storage.logfile import log_to
 from vermilion.tracking.identity.landmark_identity import fit_identity
 from vermilion.tracking.identity.sampling import sample_takes, tells_lips
 from vermilion.tracking.result import Identity
-from vermilion.tracking.settings import identity_settings
+from vermilion.tracking.settings import identity_settings, own_lips_settings
 
 
 def main(snakemake):
@@ -17,7 +17,7 @@ def main(snakemake):
     settings = identity_settings(cfg["tracking.fit"], cfg["tracking.identity"])
     fit = fit_identity(tracker, samples, settings)
     print(f"identity {fit.identity.round(2)}, {fit.reprojection_px:.2f} px, focal {fit.focal_px}")
-    own_lips = tells_lips(inputs.landmarks) and cfg["tracking.identity"]["own_lips"]
+    own_lips = own_lips_settings(cfg["tracking.identity"], tells_lips(inputs.landmarks))
     Identity.of(fit, tracker, samples, own_lips=own_lips).save(snakemake.output.identity)
 
 

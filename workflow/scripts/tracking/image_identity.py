@@ -16,7 +16,7 @@ from vermilion.tracking.identity.sampling import sample_takes, tells_lips
 from vermilion.tracking.image_fit.overlay import residual_sheet
 from vermilion.tracking.image_fit.residual import photometric_residual
 from vermilion.tracking.result import Identity
-from vermilion.tracking.settings import identity_settings
+from vermilion.tracking.settings import identity_settings, own_lips_settings
 
 STEPS = ("landmarks", "with images")
 #: Frames of the overlay. Not a key: changing it would rerun everything that follows the identity.
@@ -61,7 +61,7 @@ def main(snakemake):
     shown = evenly_spaced(len(sheets), SHOWN)
     rows = [residual_sheet([sheets[index][0]], sheets[index][1]) for index in shown]
     write_srgb8(snakemake.output.overlay, tile(rows, 1))
-    own_lips = tells_lips(inputs.landmarks) and options["own_lips"]
+    own_lips = own_lips_settings(options, tells_lips(inputs.landmarks))
     Identity.of(fit, tracker, samples, own_lips=own_lips).save(snakemake.output.identity)
 
 

@@ -7,10 +7,12 @@ the vertices minimises
     1 / (2 noise^2) * sum over lip landmarks |d - offset|^2
     + 1 / (2 sigma^2 length^2) * integral of |d|^2 + length^4 |Laplacian d|^2
 
-over the surface: a smooth random field of deviation `SIGMA_MM` that is correlated over `LENGTH_MM`.
+over the surface: a smooth random field of deviation sigma that is correlated over the length.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -19,11 +21,24 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 from vermilion.landmarks.scheme import MOUTH
 
-LENGTH_MM, SIGMA_MM, NOISE_MM = 10.0, 2.0, 0.3
+
+@dataclass(frozen=True)
+class OwnLips:
+    """How far mouths differ from what the tracker's identities show.
+
+    Attributes:
+        range_mm: the length, over which neighbouring skin moves along.
+        sigma_mm: deviation of the offset.
+        noise_mm: deviation of a landmark's mean offset.
+    """
+
+    range_mm: float
+    sigma_mm: float
+    noise_mm: float
 
 
 def lip_offset(
-    model: FaceModel, neutral_mm: np.ndarray, landmark_offset_mm: np.ndarray
+    model: FaceModel, neutral_mm: np.ndarray, landmark_offset_mm: np.ndarray, prior: OwnLips
 ) -> np.ndarray:
     """Offset (V, 3) mm of the neutral, head frame, with which its lips lie where they are seen.
 
@@ -31,15 +46,17 @@ def lip_offset(
         model: the tracker's.
         neutral_mm: (V, 3) of the person in it, head frame.
         landmark_offset_mm: (66, 3) mm, head frame: landmarks as detected minus the neutral's.
+        prior: how far mouths differ.
     """
     laplacian, mass = cotangent_laplacian(neutral_mm, model.triangles)
     areas = np.maximum(mass.diagonal(), 1e-3 * mass.diagonal().mean())
     bending = laplacian @ sparse.diags(1.0 / areas) @ laplacian
-    prior = (sparse.diags(areas) + LENGTH_MM**4 * bending) / (SIGMA_MM * LENGTH_MM) ** 2
+    stiffness = sparse.diags(areas) + prior.range_mm**4 * bending
+    stiffness = stiffness / (prior.sigma_mm * prior.range_mm) ** 2
     vertices = model.landmarks[MOUTH]
     data = sparse.csr_matrix(
-        (np.full(len(vertices), NOISE_MM**-2), (vertices, np.arange(len(vertices)))),
+        (np.full(len(vertices), prior.noise_mm**-2), (vertices, np.arange(len(vertices)))),
         shape=(len(neutral_mm), len(vertices)),
     )
     counts = np.asarray(data.sum(axis=1)).ravel()
-    return CholeskyFactor(prior + sparse.diags(counts)).solve(data @ landmark_offset_mm[MOUTH])
+    return CholeskyFactor(stiffness + sparse.diags(counts)).solve(data @ landmark_offset_mm[MOUTH])
