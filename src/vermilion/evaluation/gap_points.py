@@ -89,7 +89,8 @@ class GapPoints:
 
     def without(self, unknown: np.ndarray) -> GapPoints:
         """The same, points at `unknown` (V,) bool vertices left out."""
-        left_out = unknown[self.points.corners(self.triangles)].any(axis=1)
+        of_corners = unknown[self.points.corners(self.triangles)] & (self.points.barycentric > 0)
+        left_out = of_corners.any(axis=1)
         return replace(self, columns=np.where(left_out, -1, self.columns))
 
     def gaps(self, sequence_mm: np.ndarray, to_head: np.ndarray) -> np.ndarray:
