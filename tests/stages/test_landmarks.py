@@ -56,10 +56,10 @@ def stage(tmp_path_factory):
     return root, np.array(truth)
 
 
-def parameters(root, detector="trained", **csv):
-    values = section(detector=detector, csv=csv)
+def parameters(root, detector="trained", **files):
+    values = section(detector=detector, files=files)
     return {
-        "cfg": {f"landmarks.{key}": values[key] for key in ("detector", "networks", "csv")},
+        "cfg": {f"landmarks.{key}": values[key] for key in ("detector", "networks", "files")},
         "source": str(root / "take"),
         "model": str(root / "model.npz"),
     }
@@ -167,8 +167,8 @@ def test_landmarks_of_another_tracker_are_taken_from_its_file(stage):
     rows = [[f + 1, *(truth[f].T.reshape(-1) - 0.5)] for f in (0, 1)]
     path = root / "t.csv"
     path.write_text("\n".join(",".join(map(str, row)) for row in [header, *rows]))
-    params = parameters(root, "csv", path=str(path))
-    track, quality = find(root, [0, 1, 3], params, csv=path)
+    params = parameters(root, "files", path=str(path))
+    track, quality = find(root, [0, 1, 3], params, files=path)
     assert np.allclose(track.points_px[:2], truth[:2])
     assert list(track.valid) == [True, True, False]
     assert quality["reason"][2] == "no face found"
@@ -181,7 +181,7 @@ def test_views_hold_the_cameras_that_see_a_face(stage):
     run_script(
         "landmarks/landmarks_views",
         wildcards={"subject": "a", "take": "t"},
-        params=parameters(root) | {"frame": 0, "csv": ""},
+        params=parameters(root) | {"frame": 0, "files": ""},
         input={"cameras": root / "cameras"},
         output={"views": root / "views.npz", "overlay": root / "views.png"},
     )
@@ -228,7 +228,7 @@ def key_frames_of(root, **inputs):
             "source": str(root / "take"),
             "camera": "cam",
         },
-        input={"landmarks": [root / "raw.npz"], "labels": [], "csv": []} | inputs,
+        input={"landmarks": [root / "raw.npz"], "labels": [], "files": []} | inputs,
         output={"key_frames": root / "keys.npz", "table": root / "keys.tsv"},
     )
     return read_table(root / "keys.tsv", ["frame", "key_frame", "region_distance"])
@@ -279,5 +279,5 @@ def test_landmarks_of_openface_are_key_frames(moving):
     rows = [[f + 1, 0.98, int(f != 1), *(extra[f].T.reshape(-1) - 0.5)] for f in (0, 1, 3)]
     path = root / "openface.csv"
     path.write_text("\n".join(", ".join(map(str, row)) for row in [header, *rows]))
-    kinds = key_frames_of(root, csv=[path])["key_frame"].fillna("")
+    kinds = key_frames_of(root, files=[path])["key_frame"].fillna("")
     assert [frame for frame, kind in enumerate(kinds) if kind == "given"] == [0, 3]

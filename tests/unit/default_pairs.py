@@ -144,9 +144,12 @@ FUNCTIONS = {
     "inpaint.tattoo.tattoo_mask": {"closing_mm": "inpaint.mask.closing_mm"},
     "landmarks.flow.FaceFlow": {"face_px": "landmarks.correction.face_px"},
     "landmarks.table.read_landmark_csv": {
-        "first_frame": "landmarks.csv.first_frame",
-        "pixel_centre": "landmarks.csv.pixel_centre",
-        "min_confidence": "landmarks.csv.min_confidence",
+        "pixel_centre": "landmarks.files.pixel_centre",
+        "min_confidence": "landmarks.files.min_confidence",
+    },
+    "landmarks.point_file.read_point_file": {
+        "pixel_centre": "landmarks.files.pixel_centre",
+        "min_confidence": "landmarks.files.min_confidence",
     },
     "multiview.photometric.motion_at": {"min_agreement": "multiview.track.min_agreement"},
     "multiview.photometric.measure_motion": {"min_agreement": "multiview.track.min_agreement"},

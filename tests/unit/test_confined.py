@@ -121,7 +121,7 @@ def test_what_a_usd_names_is_looked_at(place):
 @pytest.mark.parametrize(
     ("more", "key"),
     [
-        ({"landmarks": {"detector": "csv", "csv": {"path": "private/{camera}.csv"}}}, "landmarks.csv.path"),
+        ({"landmarks": {"detector": "files", "files": {"path": "private/{camera}.csv"}}}, "landmarks.files.path"),
         (
             {"tracking": {"external": {"base": {"weights": "private/{take}.csv"}}}},
             "tracking.external.base.weights",

@@ -11,8 +11,10 @@ from vermilion.landmarks.detector import Landmarks, LandmarkTrack
 from vermilion.landmarks.faces import SeenFaces, find_faces
 from vermilion.landmarks.following import FaceChoice, follow
 from vermilion.landmarks.labels import label_files, read_label, read_labels
+from vermilion.landmarks.point_file import read_point_file
 from vermilion.landmarks.scheme import FROM_68, LIP_INNER, LIP_OUTER, MIRROR, interocular_px
-from vermilion.landmarks.table import read_landmark_csv
+from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
+from vermilion.landmarks.table import GivenLandmarks, read_landmark_csv
 from vermilion.landmarks.views import LandmarkViews
 from vermilion.storage.errors import InputError
 
@@ -154,3 +156,59 @@ def test_a_table_with_text_for_a_number_is_refused(tmp_path):
     path.write_text(path.read_text().replace("100,", "left,", 1))
     with pytest.raises(InputError, match="no number"):
         read_landmark_csv(path)
+
+
+def write_json(path, frames, **content):
+    path.write_text(json.dumps({"unit": "px", "frames": frames} | content))
+    return path
+
+
+def dense_points(count=478, depth=True):
+    rng = np.random.default_rng(4)
+    return rng.uniform(0.2, 0.8, (count, 3 if depth else 2))
+
+
+def test_points_in_image_sizes_are_those_of_mediapipe(tmp_path):
+    points = dense_points()
+    frames = {"0": points.tolist(), "1": None, "3": {"points": points.tolist(), "confidence": 0.4}}
+    path = write_json(tmp_path / "m.json", frames, unit="image", size_px=[640, 360])
+    found = read_point_file(path, MEDIAPIPE478)
+    assert list(found) == [0]
+    assert np.allclose(found[0].points_px, points[:, :2] * [640, 360])
+    assert np.allclose(found[0].depth_px, points[:, 2] * 640)
+    assert list(read_point_file(path, MEDIAPIPE478, min_confidence=0.3)) == [0, 3]
+
+
+def test_pixels_in_json_are_those_of_a_csv(tmp_path):
+    points = np.array([[100 + k, 200 + k] for k in range(68)])
+    json_path = write_json(tmp_path / "p.json", {"0": points.tolist()})
+    csv_path = write_csv(tmp_path / "of.csv", frames=(1,), confidence=(1.0,), success=(1,))
+    options = {"set": "ibug66", "first_frame": None, "pixel_centre": 0.0, "min_confidence": 0.5}
+    tables = [GivenLandmarks(path=str(path), **options).read() for path in (json_path, csv_path)]
+    assert [table.landmark_set for table in tables] == [IBUG66, IBUG66]
+    assert np.allclose(tables[0].at(0).points_px, tables[1].at(0).points_px)
+
+
+def test_a_csv_of_478_points_has_dense_lips(tmp_path):
+    path = write_csv(tmp_path / "m.csv", count=478, frames=(1,), confidence=(1.0,), success=(1,))
+    found = read_landmark_csv(path, MEDIAPIPE478).at(0)
+    assert found.points_px.shape == (478, 2) and found.landmark_set is MEDIAPIPE478
+    with pytest.raises(InputError, match="x_0 to x_477"):
+        read_landmark_csv(write_csv(tmp_path / "of.csv"), MEDIAPIPE478)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ({"frames": {"7": [[1.0, 2.0]] * 66}}, r"frame 7.*478 points"),
+        ({"frames": {"7": [["a", "b"]] * 478}}, r"frame 7.*no lists of numbers"),
+        ({"frames": {"x": None}}, "a frame 'x'"),
+        ({"frames": [[1.0, 2.0]]}, "no object with frames"),
+        ({"frames": {}, "unit": "mm"}, "the unit 'mm'"),
+        ({"frames": {}, "unit": "image", "size_px": [0, 5]}, r"size_px \[0, 5\]"),
+    ],
+)
+def test_wrong_files_of_points_say_what_is_wrong(tmp_path, content, says):
+    path = write_json(tmp_path / "m.json", **({"frames": {}} | content))
+    with pytest.raises(InputError, match=rf"m\.json.*{says}|{says}"):
+        read_point_file(path, MEDIAPIPE478)

@@ -41,7 +41,7 @@ def test_scans_of_nobody_and_without_landmarks_are_refused(tmp_path):
     )
     raw = {
         "takes": str(sheet),
-        "landmarks": {"detector": "csv", "csv": {"path": "{subject}.csv"}},
+        "landmarks": {"detector": "files", "files": {"path": "{subject}.csv"}},
         "tracking": {"scans": {"ann": {"path": "ann.obj"}}},
     }
     with pytest.raises(ConfigurationError) as error:

@@ -27,7 +27,9 @@ if _INSTEAD and IS_MAIN_PROCESS:
 
 def dense_landmarks():
     """Whether the landmarks of a take have dense lips: flow corrects the 66 points alone."""
-    return DETECTOR == "mediapipe" and CONFIG.landmarks.correction.mode == "raw"
+    files = CONFIG.landmarks.files.set if DETECTOR == "files" else ""
+    dense = DETECTOR == "mediapipe" or files == "mediapipe478"
+    return dense and CONFIG.landmarks.correction.mode == "raw"
 
 
 def detector_cfg(*more):
@@ -39,7 +41,7 @@ def detector_cfg(*more):
 
 
 def detector_files(wildcards):
-    """What the detector reads: its model or networks; nothing for CSV files and mediapipe."""
+    """What the detector reads: its model or networks; nothing for files and mediapipe."""
     folder = Path(CONFIG.landmarks.models)
     if DETECTOR == "onnx":
         return [str(folder / FACE_FILE), str(folder / LANDMARK_FILE)]
@@ -52,17 +54,17 @@ def detector_path(wildcards):
     return paths.get(DETECTOR, P.landmark_model)
 
 
-def landmark_csv(wildcards, camera):
+def landmark_file(wildcards, camera):
     """The file of another tracker that holds a take's landmarks in one camera."""
-    return CONFIG.landmarks.csv.path.format(
+    return CONFIG.landmarks.files.path.format(
         subject=wildcards.subject, take=wildcards.take, camera=camera
     )
 
 
-def landmark_csv_input(wildcards):
-    if DETECTOR != "csv":
+def landmark_file_input(wildcards):
+    if DETECTOR != "files":
         return []
-    return landmark_csv(wildcards, mono_camera(wildcards))
+    return landmark_file(wildcards, mono_camera(wildcards))
 
 
 def training_takes():
@@ -128,9 +130,9 @@ def given_landmark_labels(wildcards):
     ]
 
 
-def key_frame_csv(wildcards):
+def key_frame_file(wildcards):
     """The file of another tracker whose landmarks count as key frames, where there is one."""
-    path = CONFIG.landmarks.key_frames.csv.path.format(
+    path = CONFIG.landmarks.key_frames.files.path.format(
         subject=wildcards.subject, take=wildcards.take, camera=mono_camera(wildcards)
     )
     return [path] if path and Path(path).is_file() else []
@@ -141,7 +143,7 @@ rule landmarks_faces:
     input:
         images=chunk_images,
         detector=detector_files,
-        csv=landmark_csv_input,
+        files=landmark_file_input,
     output:
         faces=P.faces,
     log:
@@ -152,7 +154,7 @@ rule landmarks_faces:
         mem_mb=growing(1000),
         runtime=growing(60),
     params:
-        cfg=detector_cfg("landmarks.csv"),
+        cfg=detector_cfg("landmarks.files"),
         code=code_of("landmarks/landmarks_faces"),
         source=chunk_source,
         camera=mono_camera,
@@ -223,7 +225,7 @@ if CONFIG.landmarks.correction.mode == "flow":
             images=mono_images,
             landmarks=per_chunk(DETECTED + "/{chunk}.npz"),
             labels=given_landmark_labels,
-            csv=key_frame_csv,
+            files=key_frame_file,
         output:
             key_frames=P.key_frames,
             table=P.key_frames_table,
@@ -286,11 +288,11 @@ rule landmarks_views:
         mem_mb=growing(1000),
         runtime=growing(30),
     params:
-        cfg=detector_cfg("landmarks.csv"),
+        cfg=detector_cfg("landmarks.files"),
         code=code_of("landmarks/landmarks_views"),
         source=source_of,
         frame=first_frame,
         model=detector_path,
-        csv=lambda wildcards: landmark_csv(wildcards, "{camera}"),
+        files=lambda wildcards: landmark_file(wildcards, "{camera}"),
     script:
         "../scripts/landmarks/landmarks_views.py"

@@ -64,8 +64,8 @@ def _data_paths(
 ) -> Iterator[tuple[str, str]]:
     landmarks, tracking = configuration.landmarks, configuration.tracking
     patterns = {
-        "landmarks.csv.path": landmarks.csv.path,
-        "landmarks.key_frames.csv.path": landmarks.key_frames.csv.path,
+        "landmarks.files.path": landmarks.files.path,
+        "landmarks.key_frames.files.path": landmarks.key_frames.files.path,
         "tracking.external.base.weights": tracking.external.base.weights,
         "evaluation.truth": configuration.evaluation.truth,
     }

@@ -57,10 +57,10 @@ def _scans(configuration: Configuration, subjects: set[str]) -> Iterator[str]:
                 f"{key}: found a subject without takes; expected one of "
                 f"{', '.join(sorted(subjects))}."
             )
-        if configuration.landmarks.detector == "csv" and not scan.landmarks:
+        if configuration.landmarks.detector == "files" and not scan.landmarks:
             yield (
                 f"{key}.landmarks: found nothing; expected a file, because landmarks.detector is "
-                "`csv` and nothing finds landmarks in images."
+                "`files` and nothing finds landmarks in images."
             )
 
 

@@ -39,25 +39,31 @@ class MediapipeConfig(StageConfig):
 
 
 class LandmarkFilesConfig(StageConfig):
-    """Landmarks of another tracker, a CSV a take (`detector: csv`)."""
+    """Landmarks of another tracker, a file a take (`detector: files`)."""
 
     path: str = Field(
         "",
         description="File of a take's landmarks, with {subject}, {take} and {camera} in place of "
-        "their names: columns frame, x_0.., y_0.. of 66 or 68 points, optional confidence and "
-        "success (the format of OpenFace).",
+        "their names: a CSV with columns frame, x_0.., y_0.., optional confidence and success (the format of "
+        "OpenFace), or JSON (docs/landmarks.md).",
     )
-    first_frame: int = Field(
-        1,
+    set: Literal["ibug66", "mediapipe478"] = Field(
+        "ibug66",
+        description="What the points are. `ibug66`: 66 points, or 68 whose inner mouth corners are left out. "
+        "`mediapipe478`: the 478 points of mediapipe's attention mesh.",
+    )
+    first_frame: int | None = Field(
+        None,
         ge=0,
-        description="Number that the file gives to frame 0 of the take's source (OpenFace: 1).",
+        description="Number that the file gives to frame 0 of the take's source. Empty: 1 in a CSV, as "
+        "OpenFace counts, 0 in JSON.",
     )
     pixel_centre: float = Field(
         0.0,
         ge=0.0,
         le=0.5,
         description="Coordinates that the file gives to the centre of the top-left pixel (pixels): "
-        "0 as OpenCV and OpenFace have it, or 0.5.",
+        "0 as OpenCV and OpenFace have it, or 0.5. Not for the unit `image` of JSON.",
     )
     min_confidence: float = Field(
         0.5,
@@ -113,7 +119,7 @@ class KeyFramesConfig(StageConfig):
         le=100_000,
         description="Longer clips between key frames are divided (frames).",
     )
-    csv: LandmarkFilesConfig = section(
+    files: LandmarkFilesConfig = section(
         LandmarkFilesConfig,
         "Landmarks of another tracker, frame by frame, that count as key frames where "
         "the file exists and the tracker was sure.",
@@ -190,12 +196,12 @@ class FollowingConfig(StageConfig):
 class LandmarksConfig(StageConfig):
     """Landmarks of every frame (Mono13 5)."""
 
-    detector: Literal["mediapipe", "trained", "onnx", "csv"] = Field(
+    detector: Literal["mediapipe", "trained", "onnx", "files"] = Field(
         "trained",
         description="`mediapipe`: the attention mesh of mediapipe, 478 points, for real faces; needs "
         "the environment in `mediapipe`, and without it gives way to `onnx` where `models` is named, "
         "else to `trained`. `trained`: the embedded regressor, trained on `training_takes`. `onnx`: "
-        "the networks in `models`. `csv`: files of another tracker.",
+        "the networks in `models`. `files`: landmarks of another tracker, in `files`.",
     )
     mediapipe: MediapipeConfig = section(MediapipeConfig, "The attention mesh of mediapipe.")
     models: str = Field(
@@ -209,7 +215,7 @@ class LandmarksConfig(StageConfig):
     )
     following: FollowingConfig = section(FollowingConfig, "The face that is followed.")
     networks: NetworksConfig = section(NetworksConfig, "The ONNX networks.")
-    csv: LandmarkFilesConfig = section(LandmarkFilesConfig, "Files of another tracker.")
+    files: LandmarkFilesConfig = section(LandmarkFilesConfig, "Files of another tracker.")
     training: LandmarkTrainingConfig = section(LandmarkTrainingConfig, "The embedded regressor.")
     key_frames: KeyFramesConfig = section(KeyFramesConfig, "Frames whose landmarks are trusted.")
     correction: LandmarkCorrectionConfig = section(
@@ -218,7 +224,7 @@ class LandmarksConfig(StageConfig):
 
     @model_validator(mode="after")
     def _detector_has_what_it_needs(self) -> LandmarksConfig:
-        needs = {"onnx": ("models", self.models), "csv": ("csv.path", self.csv.path)}
+        needs = {"onnx": ("models", self.models), "files": ("files.path", self.files.path)}
         if self.detector in needs and not needs[self.detector][1]:
             raise ValueError(
                 f"landmarks.detector is '{self.detector}' but landmarks.{needs[self.detector][0]} "

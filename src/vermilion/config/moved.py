@@ -12,6 +12,8 @@ MOVED = {
     "refinement.offsets": "tracking.offsets",
     "refinement.overlay_frames": "tracking.image_fit.overlay_frames",
     "refinement": "tracking.image_fit",
+    "landmarks.csv": "landmarks.files",
+    "landmarks.key_frames.csv": "landmarks.key_frames.files",
     "detail.shading": "detail.relief",
     "tracking.identity.pictures": "tracking.identity.images",
     "correction.image.closed": "correction.image.closed_gap_iod",

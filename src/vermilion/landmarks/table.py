@@ -1,4 +1,4 @@
-"""Landmarks of another tracker: CSV of OpenFace, or of 66 or 68 points."""
+"""Landmarks of another tracker: a CSV, as OpenFace writes it, or a JSON file of points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vermilion.landmarks.detector import Landmarks
-from vermilion.landmarks.scheme import FROM_68, N_LANDMARKS
+from vermilion.landmarks.point_file import read_point_file
+from vermilion.landmarks.scheme import FROM_68
+from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
 from vermilion.storage.errors import InputError
 from vermilion.storage.tables import read_delimited
 
@@ -19,17 +21,49 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LandmarkTable:
-    """Landmarks by frame number, as read from a file."""
+    """Landmarks by frame number, as read from a file, all of one set."""
 
     by_frame: dict[int, Landmarks]
+    landmark_set: LandmarkSet = IBUG66
 
     def at(self, frame: int) -> Landmarks:
         """Landmarks of a frame; none where the file has no such frame."""
-        return self.by_frame.get(int(frame), Landmarks.none())
+        return self.by_frame.get(int(frame), Landmarks.none(self.landmark_set))
+
+
+@dataclass(frozen=True)
+class GivenLandmarks:
+    """How files of another tracker are read.
+
+    Attributes:
+        path: the file of a take; `.json`, or a CSV.
+        set: name of the set of its points.
+        first_frame: number that it gives to frame 0; None: 1 in a CSV (as OpenFace counts), 0 in JSON.
+        pixel_centre: coordinates that it gives to the centre of the top-left pixel.
+        min_confidence: frames with less count as not found.
+    """
+
+    path: str
+    set: str
+    first_frame: int | None
+    pixel_centre: float
+    min_confidence: float
+
+    def read(self) -> LandmarkTable:
+        """The landmarks of the file. Raises InputError where it is damaged or of another set."""
+        kind, json = set_of(self.set), Path(self.path).suffix.lower() == ".json"
+        first = self.first_frame if self.first_frame is not None else int(not json)
+        if json:
+            return LandmarkTable(
+                read_point_file(self.path, kind, first, self.pixel_centre, self.min_confidence),
+                kind,
+            )
+        return read_landmark_csv(self.path, kind, first, self.pixel_centre, self.min_confidence)
 
 
 def read_landmark_csv(
     path: str | Path,
+    landmark_set: LandmarkSet = IBUG66,
     first_frame: int = 1,
     pixel_centre: float = 0.0,
     min_confidence: float = 0.5,
@@ -38,6 +72,7 @@ def read_landmark_csv(
 
     Args:
         path: the file.
+        landmark_set: what the points are; 68 points are taken for the 66 of `ibug66`.
         first_frame: number that it gives to frame 0.
         pixel_centre: coordinates that it gives to the centre of the top-left pixel.
         min_confidence: rows with less count as not found.
@@ -49,7 +84,7 @@ def read_landmark_csv(
 
     table = read_delimited(path, ",", skipinitialspace=True)
     table.columns = [str(name).strip() for name in table.columns]
-    n_points = _count_points(table, path)
+    n_points = _count_points(table, landmark_set, path)
     try:
         numbers = table.apply(pd.to_numeric)
     except (ValueError, TypeError) as error:
@@ -58,7 +93,7 @@ def read_landmark_csv(
         ) from error
     x, y = (numbers[[f"{axis}_{k}" for k in range(n_points)]].to_numpy(float) for axis in "xy")
     points = np.stack([x, y], axis=-1) + (0.5 - pixel_centre)
-    if n_points == 68:
+    if landmark_set is IBUG66 and n_points == 68:
         points = points[:, FROM_68]
     confidence = _column(numbers, "confidence")
     good = (confidence >= min_confidence) & (_column(numbers, "success") > 0)
@@ -66,10 +101,13 @@ def read_landmark_csv(
     frames = _frames(numbers["frame"].to_numpy(float), good, path) - first_frame
     return LandmarkTable(
         {
-            int(frame): Landmarks(points[row], np.full(N_LANDMARKS, confidence[row]), True)
+            int(frame): Landmarks(
+                points[row], np.full(points.shape[1], confidence[row]), True, landmark_set
+            )
             for row, frame in enumerate(frames)
             if good[row]
-        }
+        },
+        landmark_set,
     )
 
 
@@ -94,17 +132,20 @@ def _frames(numbers: np.ndarray, good: np.ndarray, path: str | Path) -> np.ndarr
     return frames
 
 
-def _count_points(table: pd.DataFrame, path: str | Path) -> int:
-    """66 or 68. OpenFace's columns of eye and 3D landmarks have other names."""
-    for count in (68, 66):
+def _count_points(table: pd.DataFrame, landmark_set: LandmarkSet, path: str | Path) -> int:
+    """The set's points, or 68 for 66. OpenFace's columns of eye and 3D landmarks have other names."""
+    n_points = landmark_set.n_points
+    counts = (68, 66) if landmark_set is IBUG66 else (n_points,)
+    for count in counts:
         wanted = [f"{axis}_{k}" for axis in "xy" for k in range(count)]
         if "frame" in table.columns and set(wanted) <= set(table.columns):
             return count
-    found = sum(f"x_{k}" in table.columns for k in range(68))
+    found = sum(f"x_{k}" in table.columns for k in range(max(counts)))
+    more = " (or x_67, y_67)" if landmark_set is IBUG66 else ""
     raise InputError(
         f"{found} of the columns x_0, x_1, ..."
         + ("" if "frame" in table.columns else " and no column frame"),
-        "columns frame, x_0 to x_65 (or x_67), y_0 to y_65 (or y_67)",
+        f"columns frame, x_0 to x_{n_points - 1}, y_0 to y_{n_points - 1}{more}",
         "Export 2D landmarks (OpenFace: option -2Dfp).",
         path=path,
     )

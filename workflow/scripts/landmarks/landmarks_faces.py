@@ -3,17 +3,17 @@
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.choose import open_detector
 from vermilion.landmarks.faces import find_faces
-from vermilion.landmarks.sets import IBUG66
-from vermilion.landmarks.table import read_landmark_csv
+from vermilion.landmarks.table import GivenLandmarks
 from vermilion.storage.logfile import log_to
 
 
 def main(snakemake):
     cfg, params = snakemake.params.cfg, snakemake.params
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    if cfg["landmarks.detector"] == "csv":
-        table = read_landmark_csv(**{**cfg["landmarks.csv"], "path": snakemake.input.csv})
-        landmark_set = IBUG66
+    if cfg["landmarks.detector"] == "files":
+        given = {**cfg["landmarks.files"], "path": snakemake.input.files}
+        table = GivenLandmarks(**given).read()
+        landmark_set = table.landmark_set
 
         def find(frame, image):
             found = table.at(frame)

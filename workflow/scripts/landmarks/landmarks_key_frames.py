@@ -7,7 +7,7 @@ from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
 from vermilion.landmarks.labels import labels_by_frame
-from vermilion.landmarks.table import read_landmark_csv
+from vermilion.landmarks.table import GivenLandmarks
 from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import write_table
 
@@ -19,9 +19,9 @@ def main(snakemake):
     )
     track = LandmarkTrack.load(list(snakemake.input.landmarks))
     given = {}
-    for path in snakemake.input.csv:
-        found = read_landmark_csv(**{**cfg["csv"], "path": path}).by_frame
-        given |= {frame: entry.points_px for frame, entry in found.items()}
+    for path in snakemake.input.files:
+        found = GivenLandmarks(**{**cfg["files"], "path": path}).read().by_frame
+        given |= {frame: entry.as_ibug66().points_px for frame, entry in found.items()}
     drawn = labels_by_frame(
         snakemake.input.labels,
         source.size(camera),

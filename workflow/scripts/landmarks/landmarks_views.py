@@ -9,7 +9,7 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
 from vermilion.landmarks.detect import draw_landmarks
 from vermilion.landmarks.detector import Landmarks
-from vermilion.landmarks.table import read_landmark_csv
+from vermilion.landmarks.table import GivenLandmarks
 from vermilion.landmarks.views import LandmarkViews
 from vermilion.storage.errors import InputError
 from vermilion.storage.logfile import log_to
@@ -21,7 +21,7 @@ def main(snakemake):
         snakemake.params.source, snakemake.wildcards.subject, snakemake.wildcards.take
     )
     kind, detector = cfg["landmarks.detector"], None
-    if kind != "csv":
+    if kind != "files":
         detector = open_detector(kind, snakemake.params.model, cfg["landmarks.networks"])
     found, images = {}, []
     for camera in read_cameras(snakemake.input.cameras):
@@ -31,11 +31,12 @@ def main(snakemake):
         except InputError as error:
             print(error)
             continue
-        path = Path(snakemake.params.csv.format(camera=camera))
+        path = Path(snakemake.params.files.format(camera=camera))
         if detector is not None:
             found[camera] = detector.detect(image).as_ibug66()
         elif path.is_file():
-            found[camera] = read_landmark_csv(**{**cfg["landmarks.csv"], "path": path}).at(frame)
+            given = GivenLandmarks(**{**cfg["landmarks.files"], "path": str(path)})
+            found[camera] = given.read().at(frame).as_ibug66()
         images.append(label(draw_landmarks(to_display(image), found[camera]), camera))
     write_srgb8(snakemake.output.overlay, tile(images, 5))
     LandmarkViews.of(found).save(snakemake.output.views)
