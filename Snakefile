@@ -76,6 +76,12 @@ rule regressors:
         regressor_outputs(),
 
 
+rule generic:
+    """A regressor of motion from many people of the studio, for people whom no training saw."""
+    input:
+        P.model.format(regressor=GENERIC),
+
+
 onstart:
     refuse_impossible_jobs()
 

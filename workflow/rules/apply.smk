@@ -1,5 +1,8 @@
 """Better lips for a video (Lips16 6): apply/<subject>/<take>/ with meshes, weights, USD, overlay."""
 
+#: File of a regressor that was trained elsewhere; None where there is none.
+GIVEN_MODEL = CONFIG.apply.file(CONFIG.face_model.name)
+
 
 def apply_regressor(wildcards):
     """Name of the regressor that the configuration names, for this subject."""
@@ -8,14 +11,14 @@ def apply_regressor(wildcards):
 
 def apply_model(wildcards):
     """File of that regressor, or of one that was trained elsewhere; none for `regressor: none`."""
-    if CONFIG.apply.model:
-        return CONFIG.apply.model
+    if GIVEN_MODEL:
+        return GIVEN_MODEL
     return P.model.format(regressor=apply_regressor(wildcards)) if CONFIG.apply.trains else []
 
 
 def apply_neutral(wildcards):
     """Neutrals that tell a regressor what it does not know: the person's, the take's (`unpack`)."""
-    if not (CONFIG.apply.trains or CONFIG.apply.model):
+    if not (CONFIG.apply.trains or GIVEN_MODEL):
         return {}
     known = CONFIG.apply.trains and wildcards.subject in trained_on(
         apply_regressor(wildcards), trained_subjects()
@@ -36,7 +39,7 @@ EXPORTED = {
 }
 
 #: Without a regressor, which has a mask of its own, the mask is that of the correspondence.
-MASK_KEYS = () if CONFIG.apply.trains or CONFIG.apply.model else ("correspondence",)
+MASK_KEYS = () if CONFIG.apply.trains or GIVEN_MODEL else ("correspondence",)
 
 
 def exports_to(folder, overlay, timeline, category):
@@ -166,8 +169,8 @@ rule apply_export:
 
 def how_applied(wildcards):
     """What moved the lips, as the page of a take says it."""
-    if CONFIG.apply.model:
-        return f"The lips were corrected by the regressor {Path(CONFIG.apply.model).name}."
+    if GIVEN_MODEL:
+        return f"The lips were corrected by the regressor {Path(GIVEN_MODEL).name}."
     if CONFIG.apply.trains:
         return f"The lips were corrected by the regressor {apply_regressor(wildcards)}."
     return "The lips of the track follow the contours in the image; no regressor was applied."

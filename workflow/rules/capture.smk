@@ -32,8 +32,7 @@ def capture_inputs(wildcards):
     """Images of a chunk that exist, and the calibration; a missing image is the job's to name."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        images = studio_frames(wildcards, wildcards.chunk)
-        return images + studio_cameras(wildcards)
+        return studio_frames(wildcards, wildcards.chunk) + camera_inputs(wildcards)
     if is_video(take.source):
         return [take.source]
     files = capture_files(take.source)
@@ -43,9 +42,11 @@ def capture_inputs(wildcards):
 
 def camera_inputs(wildcards):
     """The calibration of a take: its files, or what the studio writes beside its images."""
-    if take_of(wildcards).source == STUDIO:
-        return studio_cameras(wildcards)
-    return camera_files(take_of(wildcards).source)
+    take = take_of(wildcards)
+    if take.source == STUDIO:
+        known = take.is_multiview or CONFIG.studio.video_calibration
+        return studio_cameras(wildcards) if known else []
+    return camera_files(take.source)
 
 
 def facts_of_video(wildcards):

@@ -28,6 +28,7 @@ from vermilion.config.skip import without_skipped
 from vermilion.config.takes import STUDIO, Take
 from vermilion.storage.errors import VermilionError
 from vermilion.config.regressors import (
+    GENERIC,
     regressors_of,
     regressors_of_study,
     trained_on,

@@ -46,3 +46,57 @@ rule database:
         ],
     script:
         "../scripts/database/database.py"
+
+
+def generic_takes():
+    """Videos of the studio whose truth a generic regressor learns from: those that the sheet's split trains."""
+    found = [take for take in takes("video") if take.source == STUDIO and take.train_frames()]
+    if not found:
+        raise WorkflowError(
+            f"{CONFIG.takes}: found no take of role `video`, source `studio` and split `train`; expected "
+            "some. A generic regressor learns from people of the studio, whose truth is known."
+        )
+    return found
+
+
+def generic_subjects():
+    """People of these takes."""
+    return list(dict.fromkeys(take.subject for take in generic_takes()))
+
+
+rule generic_database:
+    """Gathers features of synthetic people and layers that their truth tells: database/generic.h5."""
+    input:
+        studio=P.studio_model,
+        tracker=P.tracker,
+        identity=lambda wildcards: expand(P.identity, subject=generic_subjects()),
+        truth=lambda wildcards: of_takes(P.truth + "/vertices_mm.npy", generic_takes()),
+        fit=lambda wildcards: of_takes(P.fit, generic_takes()),
+        coarse=lambda wildcards: of_takes(P.coarse, generic_takes()),
+        features=lambda wildcards: of_takes(P.features, generic_takes()),
+    output:
+        database=P.generic_database,
+    log:
+        P.log("generic_database", "run"),
+    benchmark:
+        P.benchmark("generic_database", "run")
+    resources:
+        mem_mb=growing(4000),
+        runtime=growing(60),
+    params:
+        cfg=cfg_of("database", "correspondence", "correction.layers"),
+        code=code_of("database/generic_database"),
+        subjects=lambda wildcards: generic_subjects(),
+        takes=lambda wildcards: [
+            {
+                "subject": take.subject,
+                "take": take.take,
+                "fps": take.fps,
+                "split": take.split,
+                "train": take.train_frames(),
+                "chunks": len(chunks(take)),
+            }
+            for take in generic_takes()
+        ],
+    script:
+        "../scripts/database/generic_database.py"

@@ -62,7 +62,8 @@ def all_evaluated_models():
 def evaluate_inputs(wildcards):
     """Inputs that depend on the role of the take and on whether its truth is known."""
     take = take_of(wildcards)
-    inputs = {"models": evaluated_models(take.subject)}
+    generic = [CONFIG.evaluation.generic] if CONFIG.evaluation.generic else []
+    inputs = {"models": evaluated_models(take.subject) + generic}
     if take.role == "tattoo":
         inputs["layers"] = of_chunks(P.layers, take)
     if has_truth(take):

@@ -153,6 +153,7 @@ class P:
 
     # database, training
     database = R + "/database/lips.h5"
+    generic_database = R + "/database/generic.h5"
     model = R + "/models/{regressor}.h5"
     validation_table = R + "/models/{regressor}.cv.tsv"
     validation_curve = R + "/models/{regressor}.cv.png"

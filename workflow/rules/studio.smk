@@ -28,6 +28,8 @@ STUDIO_CAMERA_KEYS = (
     "lip_view_mm",
     "video_view_mm",
 )
+#: Those that a take may have of its own.
+STUDIO_OWN_CAMERA_KEYS = ("camera_distance_mm", "video_view_mm")
 STUDIO_IMAGE_KEYS = (
     "occlusion_directions",
     "light_samples",
@@ -57,9 +59,18 @@ def studio_plan(take):
         "last": take.last,
         "fps": take.fps,
         "actor": {"seed": subject.seed, "identity": subject.identity},
-        "performance": studio_performance(take).model_dump(mode="json"),
+        "performance": studio_performance(take).model_dump(
+            mode="json", exclude=set(STUDIO_OWN_CAMERA_KEYS)
+        ),
         **studio_values(STUDIO_PLAN_KEYS),
     }
+
+
+def studio_camera_values(take):
+    """Where the cameras of a take stand and what they see."""
+    own = studio_performance(take).model_dump(mode="json", include=set(STUDIO_OWN_CAMERA_KEYS))
+    given = {key: value for key, value in own.items() if value is not None}
+    return studio_values(STUDIO_CAMERA_KEYS) | given
 
 
 def studio_csv(take):
@@ -100,8 +111,9 @@ def studio_label_files(take):
 
 
 def studio_cameras(take):
-    """Camera files of a studio take."""
-    folder = fill(P.capture_folder, take) + "/cameras"
+    """Camera files of a studio take; those of a video without calibration lie with its truth."""
+    hidden = not (take_of(take).is_multiview or CONFIG.studio.video_calibration)
+    folder = fill(P.truth if hidden else P.capture_folder, take) + "/cameras"
     return [f"{folder}/{name}.txt" for name in ("cameras", "images", "points3D")]
 
 
@@ -154,11 +166,12 @@ for take in [take for take in TAKES if take.source == STUDIO]:
         params:
             cfg={
                 "plan": studio_plan(take),
-                "cameras": studio_values(STUDIO_CAMERA_KEYS),
+                "cameras": studio_camera_values(take),
                 "contours": studio_contour_labels(take),
                 "landmarks": studio_landmark_labels(take),
             },
             code=code_of("studio/studio_rig"),
+            capture=fill(P.capture_folder, take),
         script:
             "../scripts/studio/studio_rig.py"
 
@@ -189,5 +202,6 @@ for take in [take for take in TAKES if take.source == STUDIO]:
                     "frames": frames_in(chunk),
                 },
                 code=code_of("studio/studio_take"),
+                capture=fill(P.capture_folder, take),
             script:
                 "../scripts/studio/studio_take.py"

@@ -19,7 +19,9 @@ def regressor_outputs():
 rule train:
     """Trains a regressor on one subject (PS), all (MS) or all but one (GR)."""
     input:
-        database=P.database,
+        database=lambda wildcards: (
+            P.generic_database if wildcards.regressor == GENERIC else P.database
+        ),
     output:
         model=P.model,
         curve=P.validation_table,

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from vermilion.config.base import StageConfig, section
+from vermilion.config.regressors import GENERIC, generic_file
 
 HEX = r"^#[0-9a-fA-F]{6}$"
 #: Value of `regressor` with which contours alone move the lips.
@@ -105,8 +106,9 @@ class ApplyConfig(StageConfig):
         "MS",
         pattern=r"^[A-Za-z0-9_.{}\-]+$",
         description="Regressor to apply: `MS`, `PS-{subject}` or `GR-{subject}`, where `{subject}` "
-        "stands for the take's subject, or the full name of one. `none`: nothing is learnt; the lips "
-        "of the track follow the contours in the image.",
+        "stands for the take's subject, or the full name of one. `generic`: that of `models/` of the project, "
+        "which was trained on synthetic people. `none`: nothing is learnt; the lips of the track follow the "
+        "contours in the image.",
     )
     model: str | None = Field(
         None,
@@ -121,4 +123,13 @@ class ApplyConfig(StageConfig):
     @property
     def trains(self) -> bool:
         """Whether a regressor of this run's own training is applied."""
-        return self.model is None and self.regressor != NO_REGRESSOR
+        return self.model is None and self.regressor not in (NO_REGRESSOR, GENERIC)
+
+    def file(self, face_model: str) -> str | None:
+        """A regressor's file, from the project's folder, that this run does not train; None where there is none.
+
+        Args:
+            face_model: name of the face model of the track.
+        """
+        generic = self.model is None and self.regressor == GENERIC
+        return generic_file(face_model) if generic else self.model

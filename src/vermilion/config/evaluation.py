@@ -134,6 +134,12 @@ class EvaluationConfig(StageConfig):
     variants_of: list[Literal["PS", "MS", "GR"]] = Field(
         ["PS", "MS", "GR"], description="Regressors that the variants are made of."
     )
+    generic: str | None = Field(
+        None,
+        min_length=1,
+        description="File of a generic regressor (docs/database.md), measured as `GR/generic` beside the others. The face "
+        "model must be that of its training.",
+    )
     contour: ContourConfig = section(ContourConfig, "The contour baseline (Lips16 section 6).")
     measures: MeasuresConfig = section(MeasuresConfig, "Figures and their intervals.")
     figures: FiguresConfig = section(FiguresConfig, "Images of the report.")

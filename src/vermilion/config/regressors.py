@@ -12,6 +12,9 @@ Estimator = Literal["rbf", "affine", "kernel"]
 #: Lips16 to the letter: made of every regressor.
 PAPER = "paper"
 
+#: Trained on the motion of many synthetic people; it holds nothing that is any person's own.
+GENERIC = "generic"
+
 #: Variant of a regressor -> (estimator, features); None is the configured estimator.
 VARIANTS: dict[str, tuple[Estimator | None, str]] = {
     "": (None, "all"),
@@ -22,6 +25,11 @@ VARIANTS: dict[str, tuple[Estimator | None, str]] = {
     "distances-only": (None, "distances"),
     PAPER: ("rbf", "all"),
 }
+
+
+def generic_file(face_model: str) -> str:
+    """The generic regressor of a face model, from the project's folder; it may not have one."""
+    return f"models/{GENERIC}-{face_model}.h5"
 
 
 def regressors_of_study(people: Sequence[str], trained: Collection[str]) -> list[str]:
@@ -45,7 +53,7 @@ def regressors_of(subject: str, trained: Collection[str]) -> list[str]:
 
 
 def split_name(regressor: str) -> tuple[str, str | None, str]:
-    """(kind, subject, variant) of a regressor's name: `MS`, `PS-anna`, `GR-anna-affine`, ...
+    """(kind, subject, variant) of a regressor's name: `MS`, `PS-anna`, `GR-anna-affine`, `generic`, ...
 
     Raises:
         InputError: any other name.
@@ -55,11 +63,11 @@ def split_name(regressor: str) -> tuple[str, str | None, str]:
         if regressor.endswith(f"-{name}"):
             base, variant = regressor.removesuffix(f"-{name}"), name
     kind, dash, subject = base.partition("-")
-    if (kind == "MS" and not dash) or (kind in ("PS", "GR") and subject):
+    if (kind in ("MS", GENERIC) and not dash) or (kind in ("PS", "GR") and subject):
         return kind, subject or None, variant
     raise InputError(
         f"a regressor named {regressor!r}",
-        "MS, PS-<subject> or GR-<subject>, with an optional variant "
+        "MS, PS-<subject>, GR-<subject> or generic, with an optional variant "
         + ", ".join(f"-{v}" for v in VARIANTS if v),
         "Correct the name.",
     )
@@ -68,7 +76,8 @@ def split_name(regressor: str) -> tuple[str, str | None, str]:
 def trained_on(regressor: str, subjects: Sequence[str]) -> list[str]:
     """Whose frames a regressor trains on (Lips16 section 6): one, all, or all but one subject."""
     kind, subject, _ = split_name(regressor)
-    return [s for s in subjects if kind == "MS" or (s == subject) == (kind == "PS")]
+    everybody = kind in ("MS", GENERIC)
+    return [s for s in subjects if everybody or (s == subject) == (kind == "PS")]
 
 
 def measure_name(file_stem: str) -> str:
@@ -96,7 +105,7 @@ def with_variants(
 #: In the paper's order; what lies between the table's own columns is ours.
 _ORDER = ("base", "contour", "null", "oracle", "PS", "MS", "GR")
 #: Every table has them: told a neutral, a regressor is the same, told more; `paper` is Lips16's own.
-_NO_VARIANTS = ("", "neutral", "paper")
+_NO_VARIANTS = ("", "neutral", "paper", GENERIC)
 
 
 def kind_of(regressor: str) -> str:
@@ -109,7 +118,8 @@ def kind_of(regressor: str) -> str:
 def is_variant(regressor: str) -> bool:
     """Whether a row is of another estimator or features than the configured ones.
 
-    A regressor told a neutral (`GR/neutral`) is none, nor is that of Lips16 to the letter (`GR/paper`).
+    A regressor told a neutral (`GR/neutral`) is none, nor is that of Lips16 to the letter (`GR/paper`), nor
+    the generic one (`GR/generic`).
     """
     return regressor.partition("/")[2] not in _NO_VARIANTS
 
@@ -122,7 +132,7 @@ def is_shown(regressor: str) -> bool:
 def is_judged(regressor: str) -> bool:
     """Whether a row is a configured regressor's, told a neutral or not: no baseline, no variant."""
     kind, _, variant = kind_of(regressor).partition("/")
-    return kind in ("PS", "MS", "GR") and variant in ("", "neutral")
+    return kind in ("PS", "MS", "GR") and variant in ("", "neutral", GENERIC)
 
 
 def in_order(regressors: Iterable[str]) -> list[str]:

@@ -37,6 +37,27 @@ class StudioTake(StageConfig):
     csv_fps: float = Field(
         30.0, gt=0, description="`live_link` only: rate of the rows (frames a second)."
     )
+    mirrored: bool = Field(
+        False, description="`live_link` only: the recording's left and right are exchanged."
+    )
+    gain: float = Field(
+        1.0,
+        gt=0,
+        le=2,
+        description="`live_link` only: factor of the recorded weights (1), which stay between 0 and 1.",
+    )
+    camera_distance_mm: float | None = Field(
+        None,
+        gt=200,
+        le=5000,
+        description="Distance of the take's cameras from the face (mm); empty: that of all takes.",
+    )
+    video_view_mm: float | None = Field(
+        None,
+        gt=50,
+        le=1000,
+        description="Height that the video camera sees at the face (mm); empty: that of all takes.",
+    )
     lights: Literal["rig", "room", "window"] = Field(
         "rig",
         description="`rig`: even light of a capture rig. `room`: lamps above and at one side. "
@@ -102,6 +123,11 @@ class StudioConfig(StageConfig):
     )
     video_view_mm: float = Field(
         250.0, gt=50, le=1000, description="Height that a video camera sees at the face (mm)."
+    )
+    video_calibration: bool = Field(
+        True,
+        description="Whether videos come with their camera. Off: it lies with the truth, and the tracker has to "
+        "estimate the focal length.",
     )
     camera_distance_mm: float = Field(
         735.0, gt=200, le=5000, description="Distance of the cameras from the face (mm)."

@@ -64,6 +64,7 @@ def questions_of(regressor: str) -> list[Question]:
         Question("The configured regressor against one that learnt nothing", "", "=null"),
         Question("Against one that learnt nothing, told the neutral", "", "=null/neutral"),
         Question("Both told the neutral", "neutral", "=null/neutral"),
+        Question("The generic regressor against one that learnt nothing", "generic", "=null"),
         Question("The neutral known against unknown", "neutral", ""),
         Question("The neutral known against the base track", "neutral", "=base"),
     ]

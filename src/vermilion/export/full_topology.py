@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from vermilion.correspondence.models import bind_models, models_apart, shape_of
 from vermilion.export.animation import Animation, NamedShapes
 from vermilion.export.shape_basis import ShapeBasis
 from vermilion.faces.model import FaceModel
@@ -21,11 +22,8 @@ from vermilion.geometry.mesh import adjacency
 from vermilion.geometry.polygons import Polygons
 from vermilion.geometry.surface_points import SurfacePoints
 
-#: Weight of jawOpen at which surfaces are bound: no lip binds to the other.
-_APART = 0.5
 #: Beyond the coarser mesh, what is carried over fades out over this distance.
 _FADE_MM = 15.0
-_JAW = "jawOpen"
 
 
 @dataclass(frozen=True)
@@ -64,9 +62,9 @@ class FullFace:
             identity: (I,) the person's coefficients.
             shapes: the named shapes of the sequence.
         """
-        opened, pose, coarse_pose = _poses(full, face)
+        opened, pose, coarse_pose = models_apart(full, face)
         to_full = _carry(pose, full, coarse_pose, face.triangles)
-        sample = _sample(full, pose, coarse_pose)
+        sample = bind_models(full, face).matrix(full.triangles, full.n_vertices)
         count = min(len(identity), full.n_identities)
         person = opened + np.tensordot(
             identity[:count], full.identities_mm[:count].astype(np.float64), axes=1
@@ -76,7 +74,7 @@ class FullFace:
             return own + to_full @ (coarse - sample @ own)
 
         named = [
-            follows(_shape_of(full, name), np.asarray(shape, dtype=np.float64))
+            follows(shape_of(full, name), np.asarray(shape, dtype=np.float64))
             for name, shape in zip(shapes.names, shapes.shapes_mm, strict=True)
         ]
         return cls(
@@ -107,38 +105,9 @@ class FullFace:
 
 def shapes_on_coarse(full: FaceModel, face: FaceModel) -> NamedShapes:
     """All shapes of the full model on the mesh of `face`, (K, V, 3), without weights (0, K)."""
-    _, pose, coarse_pose = _poses(full, face)
-    sample = _sample(full, pose, coarse_pose)
+    sample = bind_models(full, face).matrix(full.triangles, full.n_vertices)
     shapes = np.stack([sample @ shape.astype(np.float64) for shape in full.expressions_mm])
     return NamedShapes(full.expression_names, shapes, np.zeros((0, len(shapes))))
-
-
-def _poses(full: FaceModel, face: FaceModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The full model (W, 3) as open as the coarse one's neutral; both with the lips apart."""
-    jaw = _shape_of(full, _JAW)
-    opened = full.neutral_mm + _slight_opening(full, face, jaw) * jaw
-    apart = _APART if _JAW in face.expression_names else 0.0
-    return opened, opened + apart * jaw, face.neutral_mm + apart * _shape_of(face, _JAW)
-
-
-def _sample(full: FaceModel, pose: np.ndarray, coarse_pose: np.ndarray) -> sparse.csr_matrix:
-    """(V, W): what the full surface has at the vertices of the coarse mesh."""
-    at = Surface(pose, full.triangles).closest(coarse_pose)
-    return at.matrix(full.triangles, full.n_vertices)
-
-
-def _shape_of(model: FaceModel, name: str) -> np.ndarray:
-    """Displacements (V, 3) of a shape; none where the model has no such shape."""
-    if name not in model.expression_names:
-        return np.zeros_like(model.neutral_mm)
-    return model.expressions_mm[model.expression_names.index(name)].astype(np.float64)
-
-
-def _slight_opening(full: FaceModel, face: FaceModel, jaw: np.ndarray) -> float:
-    """Weight of jawOpen that the coarser model's neutral has against the full one's."""
-    moves = jaw[full.landmarks]
-    off = face.neutral_mm[face.landmarks] - full.neutral_mm[full.landmarks]
-    return float((moves * off).sum() / max((moves**2).sum(), 1e-12))
 
 
 def _carry(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vermilion.config.regressors import VARIANTS, Estimator, split_name
+from vermilion.config.regressors import GENERIC, VARIANTS, Estimator, split_name
 from vermilion.regression.cross_validation import (
     Curve,
     Rule,
@@ -132,8 +133,8 @@ def train(
     features = (features - shifts[data.persons] if len(shifts) else features)[:, columns]
     persons = data.persons if selection.bias == "person" else None
     clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
-    # GR is for unseen subjects, so its folds hold out whole people.
-    by_person = group == "GR" and len(np.unique(data.persons)) >= LEAST_PEOPLE
+    # These are for unseen subjects, so their folds hold out whole people.
+    by_person = group in ("GR", GENERIC) and len(np.unique(data.persons)) >= LEAST_PEOPLE
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
     weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
     alphas, betas = selection.grid(kind)
@@ -153,7 +154,26 @@ def train(
         vertices, data.neutrals_mm if persons is not None else {}, shifts, neutral_features,
         novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
     )  # fmt: skip
-    return model, curve
+    return motion_only(model, features[data.first_rows]) if group == GENERIC else model, curve
+
+
+def motion_only(model: LipModel, neutral_features: np.ndarray) -> LipModel:
+    """The model without anything that is a person's own: it corrects the motion and leaves the neutral.
+
+    The neutral's correction is zero, so that the identity that the tracker found stays as it is.
+
+    Args:
+        model: fitted with a bias for each person.
+        neutral_features: (G, M') of the neutral frame of each.
+    """
+    estimator = copy.copy(model.estimator)
+    neutral = estimator.activations(neutral_features).mean(axis=0) @ estimator.coefficients_
+    estimator.bias_ = -(neutral @ estimator.basis_).astype(estimator.basis_.dtype)
+    estimator.person_biases_ = np.zeros((0, len(estimator.bias_)), estimator.basis_.dtype)
+    none = np.zeros((0, 0))
+    return replace(
+        model, estimator=estimator, neutrals_mm={}, shifts=none, neutral_features=np.zeros(0)
+    )
 
 
 def _columns(name: str, feature_names: Sequence[str], wanted: str) -> tuple[np.ndarray, list[str]]:

@@ -44,6 +44,11 @@ class TrainingSet:
         index = [self.subjects.index(s) if s in self.subjects else -1 for s in of_take]
         return np.asarray(index, dtype=np.int64)[self.sequences]
 
+    @property
+    def first_rows(self) -> np.ndarray:
+        """(G,) first row of each of the `subjects`: takes begin with the neutral."""
+        return np.unique(self.persons, return_index=True)[1]
+
     def frames_of_takes(self) -> dict[str, np.ndarray]:
         """Take -> frame numbers (n,) of its rows, of the takes that have any."""
         rows = {take: self.sequences == k for k, take in enumerate(self.takes)}

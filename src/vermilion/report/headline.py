@@ -28,6 +28,7 @@ _NULL_OF = {
     "PS": ("null/neutral", "null"),
     "MS": ("null/neutral", "null"),
     "GR": ("null",),
+    "GR/generic": ("null",),
     "PS/neutral": ("null/neutral",),
     "MS/neutral": ("null/neutral",),
     "GR/neutral": ("null/neutral",),

@@ -29,6 +29,26 @@ def arkit_name(column: str) -> str:
     return name
 
 
+def mirrored_weights(names: tuple[str, ...], weights: np.ndarray) -> np.ndarray:
+    """`weights` (F, K) of the expressions `names` with left and right exchanged, (F, K).
+
+    An expression whose counterpart is not among the names keeps its weight.
+    """
+    counterpart = [
+        names.index(other) if other in names else k
+        for k, other in enumerate(map(mirror_name, names))
+    ]
+    return weights[:, counterpart]
+
+
+def mirror_name(name: str) -> str:
+    """Name of the expression on the other side of the face; a symmetric one's is its own."""
+    for side, other in (("_L", "_R"), ("_R", "_L"), ("Left", "Right"), ("Right", "Left")):
+        if name.endswith(side):
+            return name.removesuffix(side) + other
+    return name
+
+
 def read_live_link(
     path: str | Path,
     names: tuple[str, ...],

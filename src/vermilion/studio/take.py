@@ -13,7 +13,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.studio import rig
 from vermilion.studio.lighting import LIGHTINGS, Lighting
-from vermilion.studio.live_link import read_live_link
+from vermilion.studio.live_link import mirrored_weights, read_live_link
 from vermilion.studio.look import Look, look_of
 from vermilion.studio.own_expressions import with_own_expressions
 from vermilion.studio.performance import (
@@ -121,7 +121,9 @@ def _weights(settings: TakeSettings, names: tuple[str, ...], seed: int) -> np.nd
     """Expression curves (F, K) of an actor's take, recorded or generated from the seed."""
     how, n_frames, fps = settings.performance, settings.n_frames, settings.fps
     if how.performance == "live_link":
-        return read_live_link(how.csv, names, n_frames, fps, how.csv_first, how.csv_fps)
+        weights = read_live_link(how.csv, names, n_frames, fps, how.csv_first, how.csv_fps)
+        weights = mirrored_weights(names, weights) if how.mirrored else weights
+        return np.clip(how.gain * weights, 0.0, 1.0)
     intensity = settings.motion.intensity
     return generated_weights(names, n_frames, fps, seed, intensity, how.poses, how.pose_seconds)
 

@@ -37,6 +37,8 @@ class PerformanceSettings:
         pose_seconds: shortest and longest time that a pose takes to come.
         csv: the recorded curves of `live_link`, "" for the others.
         csv_first, csv_fps: first row used, and rows a second.
+        mirrored: whether left and right of the recording are exchanged.
+        gain: factor of the recorded weights.
         lights: name of the light.
     """
 
@@ -47,6 +49,8 @@ class PerformanceSettings:
     csv: str
     csv_first: int
     csv_fps: float
+    mirrored: bool
+    gain: float
     lights: str
 
 

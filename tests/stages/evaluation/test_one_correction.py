@@ -28,7 +28,7 @@ def test_evaluation_and_apply_make_the_same_bytes_of_the_same_frames(scene, regr
     take, applied, _ = script("apply/apply").corrected_take(inputs, scene.tracker, fit, *given)
     correspondence = Correspondence.load(inputs.correspondence)
     measured = script("evaluation/evaluate").corrected_takes(
-        inputs, scene.tracker, fit, correspondence, *given
+        inputs, scene.tracker, fit, correspondence, *given, "ana"
     )[1]
     told = f"{regressor}/neutral" if regressor.startswith("GR") else regressor
     assert measured[told].corrected_mm.tobytes() == applied.tobytes()

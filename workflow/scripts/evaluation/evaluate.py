@@ -11,7 +11,7 @@ from vermilion.baselines.null import NAME as NULL
 from vermilion.baselines.null import null_model
 from vermilion.config.correction import CorrectionConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
-from vermilion.config.regressors import is_judged, measure_name
+from vermilion.config.regressors import GENERIC, is_judged, measure_name
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
 from vermilion.correction.image_contours import ImageContours
@@ -100,11 +100,17 @@ def oracle(inputs, correspondence, take, settings, rows):
     return meshes[rows], held_out.TrueLayers(mask, given["layers"][rows], given["valid"][rows])
 
 
-def regressors(inputs, take, settings, rows, null):
+def row_name(path, model, subject):
+    """Name of a model's row: that of its file, or of the generic regressor for a person."""
+    generic = model.name == GENERIC
+    return f"GR-{subject}/{GENERIC}" if generic else measure_name(Path(path).stem)
+
+
+def regressors(inputs, take, settings, rows, null, subject):
     """Name -> what each model makes of the `rows` of a take; also told the neutrals that are known."""
-    regressed = {}
+    regressed, loaded = {}, {path: load_model(path) for path in inputs.models}
     pairs = load_pairs(inputs.get("neutral_pair"), inputs.get("neutral_of_take"))
-    models = {measure_name(Path(path).stem): load_model(path) for path in inputs.models}
+    models = {row_name(path, model, subject): model for path, model in loaded.items()}
     for name, model in {NULL: null, **models}.items():
         chosen = settings.as_in_the_paper() if name.endswith("/paper") else settings
         regressed[name] = held_out.Regressed.of(model, take, chosen, rows)
@@ -181,7 +187,7 @@ def quality_rows(asked, tracked, surface):
     return rows
 
 
-def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
+def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps, subject):
     """The frames' coarse take, what regressors make of it, the oracle's meshes and layers, settings."""
     section = CorrectionConfig(
         integration=cfg["correction.integration"], image=cfg["correction.image"]
@@ -194,7 +200,7 @@ def corrected_takes(inputs, tracker, fit, correspondence, cfg, frames, fps):
     rows = np.searchsorted(take.frames, frames)
     names = read_arrays(inputs.features[0], "features", ["names"])["names"].tolist()
     null = null_model(tracker.triangles, correspondence.mask, names)
-    regressed = regressors(inputs, take, settings, rows, null)
+    regressed = regressors(inputs, take, settings, rows, null, subject)
     by_truth = oracle(inputs, correspondence, take, settings, rows)
     return take[rows], regressed, *by_truth, settings
 
@@ -209,7 +215,7 @@ def main(snakemake):
     tracked = tracked_frames(fit, asked, place)
     frames = asked[tracked]
     take, regressed, by_truth, true, settings = corrected_takes(
-        inputs, tracker, fit, correspondence, cfg, frames, snakemake.params.fps
+        inputs, tracker, fit, correspondence, cfg, frames, snakemake.params.fps, place["subject"]
     )
     contours = read_chunks(inputs.features, frames, CONTOURS)
     sequences = {"base": take.coarse_mm}

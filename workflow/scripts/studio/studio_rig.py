@@ -15,9 +15,13 @@ if __name__ == "__main__":
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     cameras = cameras_of(plan, cfg["plan"]["role"], RigSettings(**cfg["cameras"]))
-    folder = Path(snakemake.output.cameras[0]).parent
-    write_cameras(folder, cameras)
+    write_cameras(Path(snakemake.output.cameras[0]).parent, cameras)
     write_labels(
-        plan, cameras, folder.parent, cfg["plan"]["first"], cfg["contours"], cfg["landmarks"]
+        plan,
+        cameras,
+        snakemake.params.capture,
+        cfg["plan"]["first"],
+        cfg["contours"],
+        cfg["landmarks"],
     )
     write_truth(plan, Path(snakemake.output.truth[0]).parent)

@@ -13,11 +13,10 @@ if __name__ == "__main__":
     log_to(snakemake.log[0])
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
-    folder = Path(snakemake.input.cameras[0]).parent
     write_images(
         plan,
-        read_cameras(folder),
-        folder.parent,
+        read_cameras(Path(snakemake.input.cameras[0]).parent),
+        snakemake.params.capture,
         cfg["frames"],
         cfg["plan"]["first"],
         name=cfg["name"],
