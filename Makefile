@@ -8,12 +8,13 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-interchange lint format docs reference clean
+.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
 	@echo "make lips        better lips for VIDEO=clip.mp4 (MODEL=, SCAN=, OUT=): files and a page"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
+	@echo "make generic     train the regressor of models/ on sixty synthetic people (MODEL=generic)"
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
 	@echo "make doctor      say what is missing, and what to do about it"
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
@@ -41,6 +42,9 @@ $(LANDMARKS): requirements.mediapipe.lock tools/setup_landmarks.sh | $(READY)
 
 demo: setup
 	@$(VERMILION) demo
+
+generic: setup
+	@$(VERMILION) generic
 
 lips: setup
 	@$(VERMILION) lips "$(VIDEO)" $(if $(MODEL),--model "$(MODEL)") $(if $(SCAN),--scan "$(SCAN)") \

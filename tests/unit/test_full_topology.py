@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vermilion.correspondence.models import bind_models
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.full_topology import FullFace
 from vermilion.export.shape_basis import shape_basis
@@ -48,6 +49,21 @@ def test_shapes_of_the_track_give_the_full_models_shapes(scene):
         assert np.median(off) < 0.2
         # Elsewhere it keeps to the tracker's surface, which is coarser.
         assert np.percentile(off, 99) < 1.5
+
+
+def test_a_point_of_the_full_model_moves_as_the_trackers_vertex_that_it_is_bound_to(scene):
+    studio, tracker, identity, _, _ = scene
+    bound = bind_models(studio, tracker)
+    moved = []
+    for model in (studio, tracker):
+        weights = np.zeros(model.n_expressions)
+        weights[model.expression_names.index("jawOpen")] = 0.6
+        moved.append(model.vertices(identity, weights) - model.neutral_of(identity))
+    off = np.linalg.norm(bound.sample(moved[0], studio.triangles) - moved[1], axis=1)
+    lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]
+    # The lower lip drops by over 10 mm: none of its vertices is bound to the upper one.
+    assert np.linalg.norm(moved[1][lips], axis=1).max() > 10.0
+    assert off[lips].max() < 2.0 and np.median(off[lips]) < 0.2
 
 
 def test_a_correction_of_the_lips_moves_the_full_models_lips_as_much(scene):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vermilion.storage.errors import InputError
-from vermilion.studio.live_link import arkit_name, read_live_link
+from vermilion.studio.live_link import arkit_name, mirrored_weights, read_live_link
 from vermilion.studio.performance import (
     generated_weights,
     head_motion,
@@ -120,3 +120,12 @@ def test_the_recorded_performance_reads_whole(data_root):
         data_root / "performance" / "rom.csv", NAMES, 180, 30.0, csv_first=2260
     )
     assert weights.max(axis=0)[:2].min() > 0.3  # the mouth moves in this part
+
+
+def test_a_mirrored_recording_has_left_and_right_exchanged_and_the_rest_as_it_was():
+    names = ("mouthSmile_L", "mouthSmile_R", "jawOpen", "mouthLeft", "mouthRight", "jawLeft")
+    weights = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]])
+    mirrored = mirrored_weights(names, weights)
+    # Nothing stands for jawRight here, so that jawLeft has no counterpart.
+    assert mirrored.tolist() == [[0.2, 0.1, 0.3, 0.5, 0.4, 0.6]]
+    assert np.array_equal(mirrored_weights(names, mirrored), weights)

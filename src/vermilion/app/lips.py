@@ -11,6 +11,7 @@ from vermilion.app import place
 from vermilion.app.face_files import cache_folder, face_model
 from vermilion.app.lip_shot import LipShot, write_shot
 from vermilion.app.run import run_all
+from vermilion.config.regressors import GENERIC, generic_file
 from vermilion.config.takes import read_takes
 from vermilion.storage.errors import InputError
 
@@ -42,7 +43,8 @@ def correct_lips(
     """Run the workflow for one video.
 
     Args:
-        video, model, scan: files of the user, from the folder that they are in.
+        video, model, scan: files of the user, from the folder that they are in. The model `generic` is that
+            of the project's `models/` for the face model that is used.
         out: folder of the results; None: results/lips/<clip> of the project.
         span: first and last frame; None where the file's counts.
         options: of Snakemake.
@@ -53,11 +55,14 @@ def correct_lips(
     Raises:
         InputError: a file is not there, or the video cannot be read.
     """
-    given = {name: _file(name, path) for name, path in (("model", model), ("scan", scan)) if path}
+    asked = (("model", None if model == GENERIC else model), ("scan", scan))
+    given = {name: _file(name, path) for name, path in asked if path}
     source = _file("video", video)
     folder = None if out is None else Path(out).expanduser().absolute()
     project = place.enter_project()
     section, sentences = face_model()
+    if model == GENERIC:
+        given["model"] = _file("model", generic_file(section["name"]))
     shot = LipShot(source, "", section, given.get("model"), given.get("scan"), *span)
     results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
     n_frames, chunk = write_shot(shot.into(results), os.cpu_count() or 1)

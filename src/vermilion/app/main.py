@@ -9,7 +9,7 @@ from pathlib import Path
 from vermilion.app.subcommands import listing, parser_of, subcommands
 
 #: Order of the list; further subcommands follow by name.
-_FIRST = ("lips", "demo", "run", "sketch", "report", "verify", "doctor", "docs")
+_FIRST = ("lips", "demo", "run", "sketch", "report", "verify", "generic", "doctor", "docs")
 
 
 def commands() -> dict[str, str]:

@@ -128,8 +128,11 @@ class LipModel:
         return features[:, self.feature_columns]
 
 
-def save_model(path: str | Path, model: LipModel) -> None:
-    """Write a model file, whole or not at all."""
+def save_model(path: str | Path, model: LipModel, *, compact: bool = False) -> None:
+    """Write a model file, whole or not at all.
+
+    `compact` keeps the basis of layers to three digits, compressed: a file that travels with the project.
+    """
     kind = next(k for k, cls in ESTIMATORS.items() if isinstance(model.estimator, cls))
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         file.attrs.update(
@@ -145,7 +148,9 @@ def save_model(path: str | Path, model: LipModel) -> None:
         for setting in _settings(ESTIMATORS[kind]):
             file.attrs[setting] = getattr(model.estimator, setting)
         for name in model.estimator.FITTED:
-            _put(file, f"estimator/{name.rstrip('_')}", getattr(model.estimator, name))
+            values = getattr(model.estimator, name)
+            half = compact and name == "basis_"
+            _put(file, f"estimator/{name.rstrip('_')}", values.astype(np.float16) if half else values)
         if model.estimator.feature_groups is not None:
             _put(file, "estimator/feature_groups", np.array(model.estimator.feature_groups, "S"))
         _put(file, "features/names", np.array(model.feature_names, dtype="S"))
@@ -210,7 +215,8 @@ def _read(file: h5py.File) -> LipModel:
         settings["feature_groups"] = _strings(file["estimator/feature_groups"])
     estimator = ESTIMATORS[kind](**settings)
     for name in estimator.FITTED:
-        setattr(estimator, name, file[f"estimator/{name.rstrip('_')}"][:])
+        values = file[f"estimator/{name.rstrip('_')}"][:]
+        setattr(estimator, name, values.astype(np.float32) if values.dtype == np.float16 else values)
     estimator.n_features_in_ = len(estimator.feature_mean_)
     training: dict[str, np.ndarray] = {}
     for subject, takes in file["training"].items():
@@ -243,4 +249,6 @@ def _strings(dataset: h5py.Dataset) -> list[str]:
 
 
 def _put(file: h5py.File, name: str, data: np.ndarray) -> None:
-    file.create_dataset(name, data=data, track_times=False)
+    half = data.dtype == np.float16
+    packed = {"compression": 9, "shuffle": True} if half else {}
+    file.create_dataset(name, data=data, track_times=False, **packed)

@@ -1,6 +1,6 @@
 """One regressor, its cross-validation curve and that curve's image."""
 
-from vermilion.config.regressors import trained_on
+from vermilion.config.regressors import GENERIC, trained_on
 from vermilion.config.training import TrainingConfig
 from vermilion.database.read import LipDatabase
 from vermilion.regression.model import save_model
@@ -24,7 +24,7 @@ def main(snakemake):
     print(table.to_string())
     write_table(output.curve, table)
     plot_curve(output.image, name, curve, selection.choice)
-    save_model(output.model, model)
+    save_model(output.model, model, compact=name == GENERIC)
 
 
 if __name__ == "__main__":

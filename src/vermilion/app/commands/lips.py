@@ -2,6 +2,7 @@
 
     vermilion lips clip.mp4
     vermilion lips clip.mp4 --model results/sample/models/MS.h5 --scan anna.obj --out results/lips/anna
+    vermilion lips clip.mp4 --model generic             that of models/, trained on synthetic people
     vermilion lips clip.mp4 -n                          what would run
 
 No sheet and no configuration is needed: both are written into the results, so that one can change a key and
@@ -19,7 +20,7 @@ PASSES_ON = True
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The video, what is known of it, where to write."""
     parser.add_argument("video", help="a video file, or a folder of numbered images")
-    parser.add_argument("--model", help="file of a trained regressor (models/<name>.h5 of a run)")
+    parser.add_argument("--model", help="`generic`, or file of a trained regressor (models/<name>.h5 of a run)")
     parser.add_argument("--scan", help="3D scan of the person: OBJ, PLY or STL")
     parser.add_argument("--out", help="folder of the results; default results/lips/<clip>")
     parser.add_argument("--first", type=int, help="first frame; default the file's")
