@@ -45,7 +45,9 @@ def measured(
 ) -> pd.DataFrame:
     """A row a regressor for the person of a run: base, null, and the models."""
     model, take = run.tracker_model(), tracked_take(run, run.tracker_model())
-    region = CorrespondenceConfig(**keys.get("correspondence", {})).model_dump(exclude={"landmarks"})
+    region = CorrespondenceConfig(**keys.get("correspondence", {})).model_dump(
+        exclude={"landmarks"}
+    )
     mask = model_mouth_mask(model, take.neutral_mm, CorrespondenceSettings(**region))
     near = MatchTolerance(**ReferenceConfig().model_dump())
     slight_open = keys.get("face_model", {}).get("template_slight_open", 0.09)

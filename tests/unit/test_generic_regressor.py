@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from vermilion.app.generic import ship
+from vermilion.config.apply import ApplyConfig
 from vermilion.config.regressors import (
     in_order,
     is_judged,
@@ -13,7 +14,6 @@ from vermilion.config.regressors import (
     split_name,
     trained_on,
 )
-from vermilion.config.apply import ApplyConfig
 from vermilion.regression.model import load_model, save_model
 from vermilion.regression.training import Selection, train
 from vermilion.regression.training_set import TrainingSet

@@ -294,7 +294,7 @@ def test_names_of_regressors():
     assert split_name("GR-bo-shape-only") == ("GR", "bo", "shape-only")
     assert split_name("MS-affine") == ("MS", None, "affine")
     for wrong in ("MS-", "PS", "XX-ana", "MS-linear"):
-        with pytest.raises(InputError, match=r"MS, PS-<subject> or GR-<subject>"):
+        with pytest.raises(InputError, match=r"MS, PS-<subject>, GR-<subject> or generic"):
             split_name(wrong)
     people = ["ana", "bo", "cy"]
     assert trained_on("PS-bo", people) == ["bo"]

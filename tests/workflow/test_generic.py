@@ -28,7 +28,10 @@ def project(tmp_path_factory):
     studio = content["studio"]
     acted = {"poses": 3, "pose_seconds": [0.2, 0.3]}
     own = {
-        name: {"seed": 30 + k, "takes": {"clip": {**acted, "seed": k, "video_view_mm": 220 + 30 * k}}}
+        name: {
+            "seed": 30 + k,
+            "takes": {"clip": {**acted, "seed": k, "video_view_mm": 220 + 30 * k}},
+        }
         for k, name in enumerate(PEOPLE)
     }
     studio["subjects"] = own | {"people": studio["subjects"]["people"]}
@@ -62,11 +65,14 @@ def test_people_of_the_studio_make_a_regressor_that_holds_none_of_them(project):
 
     # What the database holds turns the track's neutral into the person's true one, but for the head's place.
     studio, tracker = (
-        FaceModel.load(project.results / "face_model" / f"{name}.npz") for name in ("studio", "tracker")
+        FaceModel.load(project.results / "face_model" / f"{name}.npz")
+        for name in ("studio", "tracker")
     )
     truth = np.load(project.results / "truth/c1/clip/vertices_mm.npy")[0].astype(float)
     true_mm = bind_models(studio, tracker).sample(truth, studio.triangles)[database.vertices]
-    coarse = np.load(project.results / "takes/c1/clip/tracking/C/000000-000007.npy")[0][database.vertices]
+    coarse = np.load(project.results / "takes/c1/clip/tracking/C/000000-000007.npy")[0][
+        database.vertices
+    ]
     corrected = coarse + entry.displacement_mm[0]
     assert entry.valid[0]
     spread = np.linalg.norm(true_mm - true_mm.mean(axis=0), axis=1)

@@ -74,7 +74,9 @@ def _commit() -> str:
     """The commit of the project, with `+` where files differ from it; empty without git."""
     try:
         head, changed = (
-            subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout.strip()
+            subprocess.run(
+                ["git", *words], check=True, capture_output=True, text=True
+            ).stdout.strip()
             for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--untracked-files=no"])
         )
     except (OSError, subprocess.CalledProcessError) as error:

@@ -150,7 +150,9 @@ def save_model(path: str | Path, model: LipModel, *, compact: bool = False) -> N
         for name in model.estimator.FITTED:
             values = getattr(model.estimator, name)
             half = compact and name == "basis_"
-            _put(file, f"estimator/{name.rstrip('_')}", values.astype(np.float16) if half else values)
+            _put(
+                file, f"estimator/{name.rstrip('_')}", values.astype(np.float16) if half else values
+            )
         if model.estimator.feature_groups is not None:
             _put(file, "estimator/feature_groups", np.array(model.estimator.feature_groups, "S"))
         _put(file, "features/names", np.array(model.feature_names, dtype="S"))
@@ -216,7 +218,9 @@ def _read(file: h5py.File) -> LipModel:
     estimator = ESTIMATORS[kind](**settings)
     for name in estimator.FITTED:
         values = file[f"estimator/{name.rstrip('_')}"][:]
-        setattr(estimator, name, values.astype(np.float32) if values.dtype == np.float16 else values)
+        setattr(
+            estimator, name, values.astype(np.float32) if values.dtype == np.float16 else values
+        )
     estimator.n_features_in_ = len(estimator.feature_mean_)
     training: dict[str, np.ndarray] = {}
     for subject, takes in file["training"].items():

@@ -20,7 +20,9 @@ PASSES_ON = True
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The video, what is known of it, where to write."""
     parser.add_argument("video", help="a video file, or a folder of numbered images")
-    parser.add_argument("--model", help="`generic`, or file of a trained regressor (models/<name>.h5 of a run)")
+    parser.add_argument(
+        "--model", help="`generic`, or file of a trained regressor (models/<name>.h5 of a run)"
+    )
     parser.add_argument("--scan", help="3D scan of the person: OBJ, PLY or STL")
     parser.add_argument("--out", help="folder of the results; default results/lips/<clip>")
     parser.add_argument("--first", type=int, help="first frame; default the file's")
