@@ -22,6 +22,7 @@ from vermilion.geometry.mesh_files import read_polygons
 from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
+from vermilion.scan.landmarks import ScanLandmarks, write_landmarks
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
@@ -90,7 +91,7 @@ def export(root, out, options, **more):
         "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
         "overlay": "overlay.mp4", "timeline": "timeline.png", "full": "full.npy",
         "plate": "plate", "albedo": "albedo.png", "live_link": "live_link.csv", "rig": "rig.csv",
-        "corrective": "rig_corrective.obj", **FILES,
+        "corrective": "rig_corrective.obj", "on_head": "head.npy", **FILES,
     }  # fmt: skip
     run_script(
         "apply/apply_export",
@@ -162,6 +163,90 @@ def test_another_trackers_sequence_goes_back_to_its_own_world_unit_and_polygons(
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     # The world of the capture is that of corrected.npy, as for every base.
     assert np.array_equal(np.load(tmp_path / "corrected.npy"), corrected)
+
+
+@pytest.fixture(scope="module")
+def own_head(take):
+    """The person's head as a file of a unit of 10 mm: the studio's topology with quads and texture seams."""
+    root, studio, _, _ = take
+    polygons = Polygons.with_quads(studio.triangles)
+    vertices = 0.1 * studio.neutral_of(np.array([0.5, -0.5, 0.2])) + [1.0, 150.0, 0.0]
+    seams = np.where(studio.neutral_mm[polygons.corners, 0] < 0, studio.n_vertices, 0)
+    uv = np.concatenate([0.5 * studio.uv, 0.5 * studio.uv + 0.5])
+    write_obj(root / "own_head.obj", vertices, polygons, uv, polygons.corners + seams)
+    write_landmarks(root / "marks.tsv", ScanLandmarks(vertices[studio.landmarks], np.zeros(66)))
+    run_script(
+        "apply/export_head",
+        wildcards={"subject": "s1"},
+        params={
+            "cfg": {
+                "face_model.template_slight_open": 0.09, "landmarks.detector": "csv",
+                "landmarks.networks": {},
+            }
+        },
+        input={
+            "tracker": root / "tracker.npz", "head": root / "own_head.obj",
+            "landmarks": root / "marks.tsv",
+        },
+        output={
+            "binding": root / "binding.npz", "labels": root / "labels.npz",
+            "landmarks": root / "landmarks.tsv", "overlay": root / "head.png",
+        },
+    )  # fmt: skip
+    files = {"head": root / "own_head.obj"}
+    return files | {name: root / f"{name}.npz" for name in ("binding", "labels")}, polygons
+
+
+def test_every_format_carries_the_users_own_head(take, own_head, tmp_path, capsys):
+    root, studio, tracker, corrected = take
+    files, polygons = own_head
+    rest, _ = read_polygons(files["head"])
+    rig = tmp_path / "rig"
+    write_obj(rig / "neutral.obj", rest, polygons)
+    jaw = studio.expressions_mm[studio.expression_names.index("jawOpen")]
+    write_obj(rig / "open.obj", rest + 0.1 * jaw, polygons)
+    options = ExportConfig(
+        formats=list(FILES), topology=str(files["head"]), unit_mm=10.0, rig=str(rig)
+    )
+    export(root, tmp_path, options, **files, rig=rig)
+    whole = np.load(tmp_path / "head.npy")
+    assert whole.shape == (6, studio.n_vertices, 3)
+    for name, file in FILES.items():
+        limit = options.tolerance_mm + 1e-3 if name in ("usd_shapes", "gltf") else 2e-4
+        back = read_tracked(tmp_path / file, FRAMES)
+        assert np.linalg.norm(back.vertices_mm - whole, axis=2).max() < limit, file
+        if name != "gltf":  # which has triangles alone
+            assert np.array_equal(back.polygons.corners, polygons.corners), file
+    stage = Usd.Stage.Open(str(tmp_path / FILES["usd"]))
+    st = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Face/corrected")).GetPrimvar("st")
+    assert st.GetInterpolation() == "faceVarying"
+    lips = [model.regions["vermilion_lower"] for model in (studio, tracker)]
+    means = [
+        mesh[:, mask].mean(axis=1) for mesh, mask in zip((whole, corrected), lips, strict=True)
+    ]
+    assert np.abs(means[0] - means[1]).max() < 1.0
+    # The rig stands in the file's unit: its jaw opens as the head's does.
+    weights = pd.read_csv(tmp_path / "rig.csv")["open"].to_numpy()
+    assert np.abs(np.diff(weights) - 0.1).max() < 0.03
+    assert "a unit of" in capsys.readouterr().out
+    shown, _ = read_polygons(tmp_path / "rig_corrective.obj")
+    assert np.linalg.norm(shown - rest, axis=1).max() < 1.0
+
+
+def test_the_users_head_stands_in_another_trackers_world_and_unit(take, own_head, tmp_path):
+    root = take[0]
+    turn = Rotation.from_euler("xyz", [180, 20, 5], degrees=True).as_matrix()
+    placement = Placement(turn, np.array([40.0, -30, 250]), 0.0, False)
+    origin = Origin(1000.0, "y", False, Polygons.of_triangles(take[2].triangles), 500)
+    placement.save(tmp_path / "placement.npz")
+    origin.save(tmp_path / "origin.npz")
+    files = own_head[0] | {name: tmp_path / f"{name}.npz" for name in ("placement", "origin")}
+    export(root, tmp_path, ExportConfig(formats=["usd"], topology="own_head.obj"), **files)
+    whole = np.load(tmp_path / "head.npy")
+    back = read_tracked(tmp_path / FILES["usd"], FRAMES)
+    wanted = origin.in_file(placement.undo(whole)) * 1000.0
+    assert np.linalg.norm(back.vertices_mm - wanted, axis=2).max() < 1e-3
+    assert np.array_equal(back.polygons.corners, own_head[1].corners)
 
 
 def test_the_full_face_has_the_corrected_lips_and_its_own_topology(take, tmp_path):

@@ -57,6 +57,8 @@ def exports_to(folder, overlay, timeline, category):
         outputs[name] = path if "." in EXPORTED[name] else directory(path)
     if options.topology == "full":
         outputs["full"] = folder + "/full.npy"
+    if CONFIG.apply.head_of(""):
+        outputs["on_head"] = folder + "/head.npy"
     if options.live_link:
         outputs["live_link"] = folder + "/live_link.csv"
     if options.rig:
@@ -81,6 +83,11 @@ def exports_need(wildcards):
     options = CONFIG.apply.export
     if options.topology == "full" or options.live_link:
         needed["studio"] = P.studio_model
+    head = CONFIG.apply.head_of(wildcards.subject)
+    if head:
+        needed["head"] = head
+        needed["binding"] = P.head_binding.format(subject=wildcards.subject)
+        needed["labels"] = P.head_labels.format(subject=wildcards.subject)
     if options.rig:
         needed["rig"] = options.rig
     if options.plate:
@@ -138,6 +145,39 @@ rule apply:
         camera=mono_camera,
     script:
         "../scripts/apply/apply.py"
+
+
+def head_marks(wildcards):
+    """Landmarks that were placed on the subject's head by hand; none where they are detected."""
+    path = CONFIG.apply.export.head.landmarks
+    return path.replace("{subject}", wildcards.subject) if path else []
+
+
+rule export_head:
+    """Lays our face model over a subject's own head, whose topology the exported files have."""
+    input:
+        tracker=base_model,
+        head=lambda wildcards: CONFIG.apply.head_of(wildcards.subject),
+        landmarks=head_marks,
+        detector=lambda wildcards: [] if head_marks(wildcards) else detector_files(wildcards),
+    output:
+        binding=P.head_binding,
+        labels=P.head_labels,
+        landmarks=P.head_landmarks,
+        overlay=in_report(P.head_overlay, "Corrected takes", "head", take="{subject}, own head"),
+    log:
+        P.log("export_head", "subject"),
+    benchmark:
+        P.benchmark("export_head", "subject")
+    resources:
+        mem_mb=growing(3000),
+        runtime=growing(30),
+    params:
+        cfg=detector_cfg("face_model.template_slight_open"),
+        code=code_of("apply/export_head"),
+        model=detector_path,
+    script:
+        "../scripts/apply/export_head.py"
 
 
 rule apply_export:

@@ -90,6 +90,12 @@ class P:
     scan_quality = _SUBJECT + "/scan/quality/scan.tsv"
     scan_overlay = _SUBJECT + "/scan/overlay/scan.png"
 
+    # export: a person's own head as the mesh of the files
+    head_binding = _SUBJECT + "/head/binding.npz"
+    head_labels = _SUBJECT + "/head/labels.npz"
+    head_landmarks = _SUBJECT + "/head/landmarks.tsv"
+    head_overlay = _SUBJECT + "/head/head.png"
+
     # tracking: C
     identity = _SUBJECT + "/identity.npz"
     identity_overlay = _SUBJECT + "/overlay/identity.png"

@@ -12,8 +12,25 @@ from vermilion.config.regressors import GENERIC, generic_file
 HEX = r"^#[0-9a-fA-F]{6}$"
 #: Value of `regressor` with which contours alone move the lips.
 NO_REGRESSOR = "none"
+#: Values of `export.topology` that are no file.
+OUR_TOPOLOGIES = ("tracker", "full")
 
 ExportFormat = Literal["usd", "usd_shapes", "gltf", "alembic", "obj", "ply"]
+
+
+class HeadConfig(StageConfig):
+    """Your own head as the mesh of the exported files (docs/interchange.md)."""
+
+    landmarks: str | None = Field(
+        None,
+        description="Landmarks placed by hand: a TSV with columns landmark (0 to 65), x, y, z in the head's "
+        "frame; `{subject}` stands for the take's subject. Empty: they are detected in rendered views.",
+    )
+    shape: Literal["own", "person"] = Field(
+        "own",
+        description="Whose shape the head has: its `own`, which takes the corrected motion, or that of the "
+        "`person` as tracked and corrected.",
+    )
 
 
 class ExportConfig(StageConfig):
@@ -26,11 +43,14 @@ class ExportConfig(StageConfig):
         "`alembic` (`corrected.abc`, needs the optional package `alembic3d`), `obj` and `ply` (a folder "
         "with a file a frame).",
     )
-    topology: Literal["tracker", "full"] = Field(
+    topology: str = Field(
         "tracker",
-        description="Mesh of the files: the tracker's, or the full face model with quads, eyes, teeth "
-        "and neck (also written as `full.npy`).",
+        pattern=r"^(tracker|full|.*\.([oO][bB][jJ]|[pP][lL][yY]))$",
+        description="Mesh of the files: the tracker's (`tracker`), the full face model with quads, eyes, teeth "
+        "and neck (`full`, also written as `full.npy`), or the OBJ or PLY of your own head, in which `{subject}` "
+        "stands for the take's subject (also written as `head.npy`).",
     )
+    head: HeadConfig = section(HeadConfig, "Your own head as `topology`.")
     unit_mm: float = Field(
         1.0,
         gt=0,
@@ -119,6 +139,11 @@ class ApplyConfig(StageConfig):
     export: ExportConfig = section(ExportConfig, "Files that other programs open.")
     overlay: OverlayConfig = section(OverlayConfig, "The overlay video.")
     makeup: MakeUpConfig = section(MakeUpConfig, "Virtual make-up.")
+
+    def head_of(self, subject: str) -> str | None:
+        """The subject's own head as the mesh of exported files; None where that is a mesh of ours."""
+        topology = self.export.topology
+        return None if topology in OUR_TOPOLOGIES else topology.replace("{subject}", subject)
 
     @property
     def trains(self) -> bool:

@@ -68,6 +68,8 @@ def _data_paths(
         "landmarks.key_frames.files.path": landmarks.key_frames.files.path,
         "tracking.external.base.weights": tracking.external.base.weights,
         "evaluation.truth": configuration.evaluation.truth,
+        "apply.export.topology": configuration.apply.head_of("{subject}"),
+        "apply.export.head.landmarks": configuration.apply.export.head.landmarks,
     }
     for key, pattern in patterns.items():
         # Names of takes and cameras are no paths, so that what stands before them decides.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from vermilion.config.external_base import external_checks
+from vermilion.config.own_head import head_checks
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take
 
@@ -24,6 +25,7 @@ def cross_checks(configuration: Configuration, takes: list[Take]) -> Iterator[st
     yield from _detailed("detail.takes", detail.takes, by_name)
     yield from _detailed("detail.relief.takes", detail.relief.takes, by_name)
     yield from _guided(configuration, by_name)
+    yield from head_checks(configuration)
     yield from external_checks(configuration, takes)
     for name in configuration.landmarks.training_takes:
         if name not in by_name:

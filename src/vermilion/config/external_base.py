@@ -78,8 +78,8 @@ def external_checks(configuration: Configuration, takes: Sequence[Take]) -> Iter
         )
     if configuration.apply.export.topology == "full":
         yield (
-            "apply.export.topology: found `full`; expected `tracker`, since the base is a sequence of "
-            "another tracker, which is exported on its own topology."
+            "apply.export.topology: found `full`; expected `tracker` or a head, since the base is a sequence "
+            "of another tracker."
         )
     for key, used in {
         "apply.export.live_link": configuration.apply.export.live_link,

@@ -18,6 +18,7 @@ from vermilion.config.external_base import (
     with_frames_of_images,
 )
 from vermilion.config.moved import earlier_key, earlier_keys
+from vermilion.config.own_head import missing_heads
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.config.yaml_file import read_yaml
@@ -64,7 +65,7 @@ def load_configuration(
         names = [{"subject": take.subject, "take": take.take, "of": take.of} for take in takes]
         problems += [f"{origin}, {p}" for p in key_problems(configuration, names, folders)]
     if check_disk and configuration is not None:
-        files = missing_files(configuration, takes)
+        files = [*missing_files(configuration, takes), *missing_heads(configuration, takes)]
         problems += [f"{origin}, key {problem}" for problem in files]
     if check_disk:
         reading = AS_TAGGED if configuration is None else configuration.capture.reading

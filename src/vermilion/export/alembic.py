@@ -81,8 +81,14 @@ def _write_samples(schema: Any, animation: Animation) -> None:
     scope = AbcGeom.GeometryScope.kVertexScope
     uv = AbcGeom.OV2fGeomParamSample()
     if animation.uv is not None:
-        values = imath.V2fArrayFromBuffer(np.ascontiguousarray(animation.uv, dtype=np.float32))
-        uv = AbcGeom.OV2fGeomParamSample(values, scope)
+        table, spread = animation.uv, scope
+        if animation.uv_corners is not None:
+            table, spread = (
+                table[animation.uv_corners[place]],
+                AbcGeom.GeometryScope.kFacevaryingScope,
+            )
+        values = imath.V2fArrayFromBuffer(np.ascontiguousarray(table, dtype=np.float32))
+        uv = AbcGeom.OV2fGeomParamSample(values, spread)
     rows = {int(animation.frames[row]): row for row in animation.rows}
     last = animation.rows[0]
     span = range(int(animation.frames[0]), int(animation.frames[-1]) + 1)

@@ -62,6 +62,8 @@ class Animation:
         shapes: of the base track: what the named blend shapes contribute.
         unit_mm: length of a unit in the files.
         uv: (V, 2), v up; None: the mesh has none.
+        uv_corners: (N,) row of `uv`, then (M, 2), of each corner of the polygons, where the mesh has seams;
+            None: each vertex has its own.
         camera: of the plate; None: no camera is written.
         albedo: texture file, relative to the exported files; None: none.
         plate: pattern of undistorted image files, relative, with `{frame}`; None: none.
@@ -82,6 +84,7 @@ class Animation:
     albedo: str | None = None
     plate: str | None = None
     up: str | None = None
+    uv_corners: np.ndarray | None = None
 
     @property
     def rows(self) -> list[int]:
@@ -93,3 +96,34 @@ class Animation:
         """Whether the world's y points down (an uncalibrated video's world is its camera)."""
         downwards = self.camera is not None and bool(self.camera.rotation[1, 1] > 0)
         return self.up is None and downwards
+
+    def cut_at_seams(self) -> SeamCut:
+        """The mesh with a vertex for each of its texture coordinates, for formats that have no seams."""
+        count = len(self.neutral_mm)
+        if self.uv is None or self.uv_corners is None:
+            return SeamCut(np.arange(count), self.polygons, self.uv)
+        pairs = np.stack([self.polygons.corners, self.uv_corners], axis=1).astype(np.int64)
+        found, same = np.unique(pairs, axis=0, return_inverse=True)
+        # The first of a vertex keeps its number, the others follow the last.
+        is_first = np.append(True, found[1:, 0] != found[:-1, 0])
+        number = np.where(is_first, found[:, 0], count + np.cumsum(~is_first) - 1)
+        source = np.concatenate([np.arange(count), found[~is_first, 0]])
+        uv = np.zeros((len(source), 2))
+        uv[number] = self.uv[found[:, 1]]
+        corners = number[same.reshape(-1)].astype(np.int32)
+        return SeamCut(source, Polygons(self.polygons.counts, corners), uv)
+
+
+@dataclass(frozen=True)
+class SeamCut:
+    """A mesh that is cut at the seams of its texture.
+
+    Attributes:
+        source: (W,) vertex of the whole mesh that each is; the first V are its own, in order.
+        polygons: of the W vertices.
+        uv: (W, 2), v up; None: the mesh has none.
+    """
+
+    source: np.ndarray
+    polygons: Polygons
+    uv: np.ndarray | None

@@ -36,6 +36,7 @@ class FullFace:
         neutral_mm: (W, 3) head frame.
         shapes_mm: (K, W, 3) the track's named shapes on the full mesh.
         carry: (W, V) sparse: displacements of the coarser mesh on the full one.
+        lips: (W,) bool, the vermilion.
     """
 
     polygons: Polygons
@@ -43,6 +44,7 @@ class FullFace:
     neutral_mm: np.ndarray
     shapes_mm: np.ndarray
     carry: sparse.csr_matrix
+    lips: np.ndarray
 
     @classmethod
     def of(
@@ -80,6 +82,7 @@ class FullFace:
         return cls(
             Polygons.with_quads(full.triangles), full.uv, follows(person, neutral_mm),
             np.array(named, dtype=np.float32).reshape(-1, full.n_vertices, 3), to_full,
+            full.regions["vermilion_upper"] | full.regions["vermilion_lower"],
         )  # fmt: skip
 
     def vertices_mm(self, coarse: Animation, row: int) -> np.ndarray:
@@ -89,6 +92,11 @@ class FullFace:
         known = coarse.neutral_mm + np.tensordot(weights, coarse.shapes.shapes_mm, axes=1)
         own = self.neutral_mm + np.tensordot(weights.astype(np.float32), self.shapes_mm, axes=1)
         return coarse.head.to_world(row, own + self.carry @ (local - known))
+
+    def carried(self, values: np.ndarray) -> np.ndarray:
+        """The `values` (V, c) of the coarser mesh on this one, (W, c); far from it their mean."""
+        reach = np.asarray(self.carry.sum(axis=1)).reshape(-1, 1)
+        return self.carry @ values + (1 - reach) * values.mean(axis=0)
 
     def animation(self, coarse: Animation, vertices_mm: np.ndarray) -> Animation:
         """The coarser animation with this mesh, whose vertices_mm are (F, W, 3), world."""

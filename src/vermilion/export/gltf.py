@@ -135,34 +135,38 @@ def _material() -> dict[str, Any]:
 
 
 def _mesh(buffer: _Buffer, animation: Animation, basis: ShapeBasis) -> dict[str, Any]:
-    triangles, neutral = animation.polygons.triangles, basis.neutral_mm.astype(np.float64)
-    normals = vertex_normals(neutral, triangles)
+    cut, whole = animation.cut_at_seams(), animation.polygons.triangles
+    neutral = basis.neutral_mm.astype(np.float64)
+    normals = vertex_normals(neutral, whole)
     primitive: dict[str, Any] = {
         "attributes": {
-            "POSITION": buffer.add(neutral * _METRES, _ARRAY, bounds=True),
-            "NORMAL": buffer.add(_unit(normals), _ARRAY),
+            "POSITION": buffer.add(neutral[cut.source] * _METRES, _ARRAY, bounds=True),
+            "NORMAL": buffer.add(_unit(normals)[cut.source], _ARRAY),
         },
-        "indices": buffer.add(triangles.ravel(), _ELEMENTS),
+        "indices": buffer.add(cut.polygons.triangles.ravel(), _ELEMENTS),
         "material": 0,
     }
-    if animation.uv is not None:
+    if cut.uv is not None:
         # glTF's v points down.
-        uv = np.stack([animation.uv[:, 0], 1.0 - animation.uv[:, 1]], axis=1)
+        uv = np.stack([cut.uv[:, 0], 1.0 - cut.uv[:, 1]], axis=1)
         primitive["attributes"]["TEXCOORD_0"] = buffer.add(uv, _ARRAY)
     targets = []
     for shape in basis.shapes.shapes_mm:
-        turned = vertex_normals(neutral + shape, triangles) - normals
+        turned = (vertex_normals(neutral + shape, whole) - normals)[cut.source]
         targets.append(
             {
-                "POSITION": buffer.add(shape * _METRES, _ARRAY, bounds=True),
+                "POSITION": buffer.add(shape[cut.source] * _METRES, _ARRAY, bounds=True),
                 "NORMAL": buffer.add(turned, _ARRAY),
             }
         )
-    mesh: dict[str, Any] = {"name": "corrected", "primitives": [primitive]}
+    mesh: dict[str, Any] = {"name": "corrected", "primitives": [primitive], "extras": {}}
     if targets:
         primitive["targets"] = targets
         mesh["weights"] = [0.0] * len(targets)
-        mesh["extras"] = {"targetNames": list(basis.shapes.names)}
+        mesh["extras"]["targetNames"] = list(basis.shapes.names)
+    if len(cut.source) > len(neutral):
+        # Vertices beyond those of the mesh repeat these, which a texture seam cuts.
+        mesh["extras"]["seamVertices"] = cut.source[len(neutral) :].tolist()
     return mesh
 
 

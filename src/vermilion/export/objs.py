@@ -17,17 +17,21 @@ def write_obj(
     vertices: np.ndarray,
     polygons: Polygons | np.ndarray,
     uv: np.ndarray | None = None,
+    uv_corners: np.ndarray | None = None,
 ) -> None:
-    """Write vertices (V, 3), polygons (or triangles (T, 3)) and, if given, uv (V, 2, v up) as OBJ."""
+    """Write vertices (V, 3), polygons (or triangles (T, 3)) and, if given, uv (V, 2, v up) as OBJ.
+
+    With `uv_corners` (N,), the uv of each corner, uv is (M, 2).
+    """
     if isinstance(polygons, np.ndarray):
         polygons = Polygons.of_triangles(polygons)
     with atomic_path(path) as temporary:
-        temporary.write_text(_vertex_lines(vertices) + _topology_lines(polygons, uv))
+        temporary.write_text(_vertex_lines(vertices) + _topology_lines(polygons, uv, uv_corners))
 
 
 def write_objs(folder: str | Path, animation: Animation) -> None:
     """Write `<frame:06d>.obj` of every frame that has a mesh, in the animation's unit."""
-    topology = _topology_lines(animation.polygons, animation.uv)
+    topology = _topology_lines(animation.polygons, animation.uv, animation.uv_corners)
     with atomic_folder(folder) as temporary:
         for row in progress(animation.rows, "OBJ"):
             vertices = np.asarray(animation.vertices_mm[row], np.float64) / animation.unit_mm
@@ -38,7 +42,9 @@ def write_objs(folder: str | Path, animation: Animation) -> None:
 def write_plys(folder: str | Path, animation: Animation) -> None:
     """Write `<frame:06d>.ply` (binary) of every frame that has a mesh, in the animation's unit."""
     faces = _ply_faces(animation.polygons)
-    fields = ["x", "y", "z"] + (["s", "t"] if animation.uv is not None else [])
+    # A PLY has texture coordinates of vertices alone: those of a mesh with seams are left out.
+    uv = animation.uv if animation.uv_corners is None else None
+    fields = ["x", "y", "z"] + (["s", "t"] if uv is not None else [])
     header = ["ply", "format binary_little_endian 1.0"]
     header += [f"comment a unit is {animation.unit_mm:g} mm"]
     header += [f"element vertex {len(animation.neutral_mm)}"]
@@ -49,8 +55,8 @@ def write_plys(folder: str | Path, animation: Animation) -> None:
     with atomic_folder(folder) as temporary:
         for row in progress(animation.rows, "PLY"):
             table = np.asarray(animation.vertices_mm[row], np.float64) / animation.unit_mm
-            if animation.uv is not None:
-                table = np.concatenate([table, animation.uv], axis=1)
+            if uv is not None:
+                table = np.concatenate([table, uv], axis=1)
             path = temporary / f"{int(animation.frames[row]):06d}.ply"
             path.write_bytes(start + table.astype("<f4").tobytes() + faces)
 
@@ -60,13 +66,17 @@ def _vertex_lines(vertices: np.ndarray) -> str:
     return ("v %.9g %.9g %.9g\n" * len(vertices)) % tuple(numbers)
 
 
-def _topology_lines(polygons: Polygons, uv: np.ndarray | None) -> str:
+def _topology_lines(
+    polygons: Polygons, uv: np.ndarray | None, uv_corners: np.ndarray | None = None
+) -> str:
     lines = []
     if uv is not None:
         lines.append(("vt %.6f %.6f\n" * len(uv)) % tuple(np.asarray(uv, float).ravel().tolist()))
     corners, at = (polygons.corners + 1).tolist(), 0
-    form = "{0}/{0}" if uv is not None else "{0}"
-    words = [form.format(corner) for corner in corners]
+    words = [str(corner) for corner in corners]
+    if uv is not None:
+        places = corners if uv_corners is None else (uv_corners + 1).tolist()
+        words = [f"{word}/{place}" for word, place in zip(words, places, strict=True)]
     for count in polygons.counts.tolist():
         lines.append(f"f {' '.join(words[at : at + count])}\n")
         at += count

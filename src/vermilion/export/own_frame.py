@@ -34,13 +34,16 @@ class MovedSequence:
         return np.asarray(self.vertices_mm[row], np.float64) @ self.rotation.T + self.translation_mm
 
 
-def in_own_frame(animation: Animation, placement: Placement, origin: Origin) -> Animation:
+def in_own_frame(
+    animation: Animation, placement: Placement, origin: Origin, own_polygons: bool = True
+) -> Animation:
     """The animation as the tracker's files have it.
 
     Args:
         animation: in the world of the capture.
         placement: of the tracker's world in it.
         origin: axes, unit and polygons of the files.
+        own_polygons: whether the mesh is the tracker's, and not the user's head.
     """
     turn = origin.axes @ placement.rotation.T
     move = -turn @ placement.translation_mm
@@ -49,10 +52,10 @@ def in_own_frame(animation: Animation, placement: Placement, origin: Origin) -> 
     return replace(
         animation,
         vertices_mm=MovedSequence(animation.vertices_mm, turn, move),
-        polygons=origin.polygons,
+        polygons=origin.polygons if own_polygons else animation.polygons,
         head=HeadFrame(turn @ head.rotation, head.translation_mm @ turn.T + move),
         unit_mm=origin.unit_mm,
-        uv=None,
+        uv=None if own_polygons else animation.uv,
         camera=None if camera is None else _moved(camera, turn, move),
         up=origin.up,
     )

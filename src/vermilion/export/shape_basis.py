@@ -72,17 +72,23 @@ def shape_basis(animation: Animation, tolerance_mm: float) -> ShapeBasis:
     weights = np.clip(named.weights[rows], 0.0, 1.0)
     shapes = np.asarray(named.shapes_mm, dtype=np.float32)
     neutral = np.asarray(animation.neutral_mm, dtype=np.float32)
-    rest = np.empty((len(rows), *neutral.shape), dtype=np.float32)
-    for index, row in enumerate(rows):
+
+    def left(index: int) -> np.ndarray:
+        """What the named shapes do not explain of a row, (V, 3) mm."""
         known = neutral + np.tensordot(weights[index].astype(np.float32), shapes, axes=1)
-        local = animation.head.to_head(row, np.asarray(animation.vertices_mm[row], np.float64))
-        rest[index] = local - known
-    moved = np.flatnonzero(np.linalg.norm(rest, axis=2).max(axis=0) > _STILL * tolerance_mm)
-    error = float(np.linalg.norm(rest, axis=2).max()) if len(rows) else 0.0
+        world = np.asarray(animation.vertices_mm[rows[index]], np.float64)
+        return (animation.head.to_head(rows[index], world) - known).astype(np.float32)
+
+    # Twice through the take, so that memory holds the vertices that need correctives alone.
+    farthest = np.zeros(len(neutral))
+    for index in range(len(rows)):
+        np.maximum(farthest, np.linalg.norm(left(index), axis=1), out=farthest)
+    needed = farthest > _STILL * tolerance_mm
+    moved, error = np.flatnonzero(needed), float(farthest[~needed].max(initial=0.0))
     if len(moved):
-        still = np.delete(rest, moved, axis=1)
-        error = float(np.linalg.norm(still, axis=2).max()) if still.size else 0.0
-        flat = rest[:, moved].reshape(len(rows), -1)
+        flat = np.empty((len(rows), 3 * len(moved)), dtype=np.float32)
+        for index in range(len(rows)):
+            flat[index] = left(index)[moved].ravel()
         extra, extra_weights, found = _correctives(flat, tolerance_mm)
         spread = np.zeros((len(extra), *neutral.shape), dtype=np.float32)
         spread[:, moved] = extra.reshape(len(extra), -1, 3)
@@ -95,9 +101,9 @@ def shape_basis(animation: Animation, tolerance_mm: float) -> ShapeBasis:
 
 
 def _correctives(flat: np.ndarray, tolerance_mm: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Shapes (k, N), weights (F, k) in [0, 1] and the largest error (mm) of `flat` (F, N)."""
+    """Shapes (k, N), weights (F, k) in [0, 1] and the largest error (mm) of `flat` (F, N), which is centred."""
     mean = flat.mean(axis=0, dtype=np.float64).astype(np.float32)
-    flat = flat - mean
+    flat -= mean
     gram = np.zeros((len(flat), len(flat)))
     for start in range(0, flat.shape[1], _BLOCK):
         block = flat[:, start : start + _BLOCK].astype(np.float64)

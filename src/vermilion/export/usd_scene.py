@@ -56,9 +56,13 @@ def set_topology(mesh: Any, animation: Animation) -> None:
     mesh.CreateFaceVertexCountsAttr(int_array(polygons.counts))
     mesh.CreateFaceVertexIndicesAttr(int_array(polygons.corners))
     if animation.uv is not None:
+        seams = animation.uv_corners
+        spread = UsdGeom.Tokens.vertex if seams is None else UsdGeom.Tokens.faceVarying
         primvars = UsdGeom.PrimvarsAPI(mesh)
-        st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
+        st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, spread)
         st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(animation.uv, dtype=np.float32)))
+        if seams is not None:
+            st.SetIndices(int_array(seams))
 
 
 def int_array(values: np.ndarray) -> Any:

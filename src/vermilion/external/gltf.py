@@ -147,6 +147,9 @@ def read_gltf(request: Request) -> RawSequence:
     curves = _curves(file)
     parts = file.document["meshes"][nodes[node]["mesh"]]["primitives"]
     rest, targets, polygons = _geometry(file, parts)
+    rest, targets, polygons = _without_seams(
+        file.document["meshes"][nodes[node]["mesh"]], rest, targets, polygons
+    )
     times = np.concatenate([curve.times for curve in curves.values()]) if curves else np.zeros(0)
     keys = np.rint(times * fps).astype(int)
     lost = request.absent(range(keys.min(), keys.max() + 1)) if len(keys) else {}
@@ -214,6 +217,24 @@ def _geometry(file: _File, parts: list[dict]) -> tuple[np.ndarray, np.ndarray, P
         total += len(own)
     polygons = Polygons.of_triangles(np.concatenate(triangles))
     return np.concatenate(rest), np.concatenate(targets, axis=1), polygons
+
+
+def _without_seams(
+    mesh: dict[str, Any], rest: np.ndarray, targets: np.ndarray, polygons: Polygons
+) -> tuple[np.ndarray, np.ndarray, Polygons]:
+    """The geometry without the vertices that repeat others at texture seams, where our own files name them.
+
+    `rest` (V, 3), `targets` (K, V, 3).
+    """
+    extras = mesh.get("extras")
+    doubles = extras.get("seamVertices") if isinstance(extras, dict) else None
+    if not isinstance(doubles, list) or not doubles:
+        return rest, targets, polygons
+    count = len(rest) - len(doubles)
+    source = np.concatenate([np.arange(max(count, 0)), np.asarray(doubles, dtype=np.int64)])
+    if count < 3 or len(source) != len(rest) or source.min() < 0 or source.max() >= count:
+        return rest, targets, polygons
+    return rest[:count], targets[:, :count], Polygons.of_triangles(source[polygons.triangles])
 
 
 def _curves(file: _File) -> dict[tuple[int, str], _Curve]:

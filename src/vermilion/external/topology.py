@@ -47,6 +47,7 @@ def label_topology(
     neutral: Mesh,
     landmarks: ScanLandmarks,
     *,
+    unit_mm: float | None = 1.0,
     least_opening: float = 0.0,
     **place: Any,
 ) -> ExternalTopology:
@@ -54,8 +55,9 @@ def label_topology(
 
     Args:
         generic: the tracker's model, with regions, contours, landmarks and expressions.
-        neutral: V vertices, the tracker's own frame, mm.
+        neutral: V vertices, the tracker's own frame and unit.
         landmarks: on it.
+        unit_mm: length of its unit; None: a standard one, or from the model.
         least_opening: see `personal_model`.
         place: subject, take, path of the neutral, for messages.
 
@@ -63,7 +65,9 @@ def label_topology(
         InputError: the model cannot be laid over the mesh, or the mesh has no mouth.
     """
     try:
-        made = personal_model(generic, neutral, landmarks, unit_mm=1.0, least_opening=least_opening)
+        made = personal_model(
+            generic, neutral, landmarks, unit_mm=unit_mm, least_opening=least_opening
+        )
     except InputError as error:
         raise unregistered(error.brief, **place) from error
     figures = made.figures()

@@ -25,6 +25,10 @@ class Similarity:
         """The points (..., 3) of the source frame in the target frame, (..., 3)."""
         return self.scale * points @ self.rotation.T + self.translation
 
+    def undo(self, points: np.ndarray) -> np.ndarray:
+        """The points (..., 3) of the target frame in the source frame, (..., 3)."""
+        return (points - self.translation) @ self.rotation / self.scale
+
     def turn(self, vectors: np.ndarray) -> np.ndarray:
         """Displacements `vectors` (..., 3) of the source frame in the target frame, (..., 3)."""
         return self.scale * vectors @ self.rotation.T

@@ -11,6 +11,9 @@ from vermilion.config.apply import ExportConfig
 from vermilion.export.albedo_texture import albedo_texture
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.full_topology import FullFace, shapes_on_coarse
+from vermilion.export.head_binding import HeadBinding
+from vermilion.export.head_file import read_head
+from vermilion.export.head_transfer import HeadTransfer
 from vermilion.export.live_link import write_live_link
 from vermilion.export.objs import write_obj
 from vermilion.export.overlay import join_videos
@@ -56,16 +59,25 @@ def coarse_animation(corrected, face, fit, identity, fps, unit_mm):
     )  # fmt: skip
 
 
-def on_full_face(out, animation, face, studio, identity):
-    """The animation on the full model, frame by frame through `full.npy`; and its `FullFace`."""
-    full = FullFace.of(studio, face, animation.neutral_mm, identity.identity, animation.shapes)
-    shape = (len(animation.frames), len(full.neutral_mm), 3)
+def on_other_mesh(out, animation, other, name):
+    """The animation on the full model or the user's head, frame by frame through a `.npy`."""
+    shape = (len(animation.frames), len(other.neutral_mm), 3)
     with atomic_path(out) as temporary:
         table = np.lib.format.open_memmap(temporary, "w+", np.float32, shape)
-        for row in progress(range(len(table)), "full face"):
-            table[row] = full.vertices_mm(animation, row)
+        for row in progress(range(len(table)), name):
+            table[row] = other.vertices_mm(animation, row)
         table.flush()
-    return full.animation(animation, read_sequence(out)), full
+    return other.animation(animation, read_sequence(out))
+
+
+def on_head(inputs, out, animation, face, options):
+    """The animation on the user's head, and its `HeadTransfer`."""
+    head = HeadTransfer(
+        read_head(inputs.head), HeadBinding.load(inputs.binding, inputs.labels), face,
+        animation.neutral_mm, animation.shapes, options.head.shape,
+    )  # fmt: skip
+    print(f"a unit of {inputs.head} is {head.unit_mm:.4g} mm, the size of the tracked head")
+    return on_other_mesh(out.on_head, animation, head, "head"), head
 
 
 def vertex_colours(path, face):
@@ -77,19 +89,19 @@ def vertex_colours(path, face):
     )
 
 
-def write_albedo(path, colours, animation, full):
-    """The texture of the animation's mesh; of the full face where there is one."""
-    if full is not None:
-        mean, reach = colours.mean(axis=0), np.asarray(full.carry.sum(axis=1))
-        colours = full.carry @ colours + (1 - reach) * mean
-    write_srgb8(path, albedo_texture(colours, animation.uv, animation.polygons.triangles))
+def write_albedo(path, colours, animation, other):
+    """The texture of the animation's mesh; of the full face or the user's head where there is one."""
+    if other is not None:
+        colours = other.carried(colours)
+    cut = animation.cut_at_seams()
+    write_srgb8(path, albedo_texture(colours[cut.source], cut.uv, cut.polygons.triangles))
 
 
-def add_images(snakemake, animation, face, full, options):
+def add_images(snakemake, animation, face, other, options):
     """The animation with its texture and plates, which are written."""
     inputs, out = snakemake.input, snakemake.output
     if inputs.get("appearance"):
-        write_albedo(out.albedo, vertex_colours(inputs.appearance, face), animation, full)
+        write_albedo(out.albedo, vertex_colours(inputs.appearance, face), animation, other)
         animation = replace(animation, albedo=Path(out.albedo).name)
     if options.plate:
         place = (snakemake.wildcards.subject, snakemake.wildcards.take)
@@ -106,7 +118,7 @@ def add_images(snakemake, animation, face, full, options):
     return animation
 
 
-def write_rigs(snakemake, options, coarse, animation, face):
+def write_rigs(snakemake, options, coarse, animation, face, other):
     """ARKit's weights of the corrected face, and those of the user's rig with its corrective."""
     inputs, out, fps = snakemake.input, snakemake.output, snakemake.params.fps
     if options.live_link:
@@ -118,9 +130,10 @@ def write_rigs(snakemake, options, coarse, animation, face):
             out.live_link, found.frames, fps, shapes.names, found.shapes.weights, rotation
         )
     if options.rig:
-        model = FaceModel.load(inputs.studio) if options.topology == "full" else face
-        rig = read_rig(inputs.rig, model.n_vertices)
-        found = solve_rig(animation, rig, lips_of(model))
+        rig = read_rig(inputs.rig, len(animation.neutral_mm))
+        if inputs.get("head"):  # the rig stands in the unit and frame of the head's file
+            rig = replace(rig, shapes_mm=other.head_from_file.turn(rig.shapes_mm))
+        found = solve_rig(animation, rig, lips_of(face) if other is None else other.lips)
         print(
             f"rig: {found.left_mm.mean():.3f} mm off over the lips, {found.corrected_mm.mean():.3f} mm "
             "with the corrective"
@@ -128,8 +141,9 @@ def write_rigs(snakemake, options, coarse, animation, face):
         names = [*rig.names, "corrective"]
         weights = np.column_stack([found.shapes.weights, found.corrective])
         write_weights(out.rig, found.frames, fps, names, weights, np.ones(len(weights), bool))
-        shown = (animation.neutral_mm + found.corrective_mm) / options.unit_mm
-        write_obj(out.corrective, shown, animation.polygons, animation.uv)
+        shown = animation.neutral_mm + found.corrective_mm
+        shown = other.head_from_file.undo(shown) if inputs.get("head") else shown / options.unit_mm
+        write_obj(out.corrective, shown, animation.polygons, animation.uv, animation.uv_corners)
 
 
 def lips_of(model):
@@ -152,21 +166,24 @@ def main(snakemake):
     draw_timeline(quality, title, out.timeline)
 
     coarse = coarse_animation(corrected, face, fit, identity, fps, options.unit_mm)
-    animation, full = coarse, None
+    animation, other = coarse, None
     if options.topology == "full":
         studio = FaceModel.load(inputs.studio)
-        animation, full = on_full_face(out.full, coarse, face, studio, identity)
-    write_rigs(snakemake, options, coarse, animation, face)
-    animation = add_images(snakemake, animation, face, full, options)
+        other = FullFace.of(studio, face, coarse.neutral_mm, identity.identity, coarse.shapes)
+        animation = on_other_mesh(out.full, coarse, other, "full face")
+    elif inputs.get("head"):
+        animation, other = on_head(inputs, out, coarse, face, options)
+    write_rigs(snakemake, options, coarse, animation, face, other)
+    animation = add_images(snakemake, animation, face, other, options)
+    if inputs.get("placement"):
+        placement, origin = Placement.load(inputs.placement), Origin.load(inputs.origin)
+        animation = in_own_frame(animation, placement, origin, own_polygons=other is None)
 
     def basis():
-        found = shape_basis(coarse, options.tolerance_mm)
-        return found if full is None else full.basis(found)
+        if options.topology == "full":
+            return other.basis(shape_basis(coarse, options.tolerance_mm))
+        return shape_basis(animation, options.tolerance_mm)
 
-    if inputs.get("placement"):
-        animation = coarse = in_own_frame(
-            animation, Placement.load(inputs.placement), Origin.load(inputs.origin)
-        )
     write_packages({name: out[name] for name in options.formats}, animation, basis)
 
 
