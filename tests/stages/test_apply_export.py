@@ -180,7 +180,7 @@ def own_head(take):
         wildcards={"subject": "s1"},
         params={
             "cfg": {
-                "face_model.template_slight_open": 0.09, "landmarks.detector": "csv",
+                "face_model.template_slight_open": 0.09, "landmarks.detector": "files",
                 "landmarks.networks": {},
             }
         },

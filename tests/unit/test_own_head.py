@@ -247,7 +247,7 @@ def test_a_head_is_named_by_its_file_and_needs_landmarks():
     assert ApplyConfig(export={"topology": "full"}).head_of("anna") is None
     configuration = Configuration(
         apply=apply,
-        landmarks={"detector": "csv", "csv": {"path": "l.csv"}},
+        landmarks={"detector": "files", "files": {"path": "l.csv"}},
         guided={"takes": {"anna/a": "H"}},
     )
     sentences = list(head_checks(configuration))

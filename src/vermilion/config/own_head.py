@@ -21,10 +21,10 @@ def head_checks(configuration: Configuration) -> Iterator[str]:
                 f"`{export.topology}`. Name your head there."
             )
         return
-    if configuration.landmarks.detector == "csv" and not export.head.landmarks:
+    if configuration.landmarks.detector == "files" and not export.head.landmarks:
         yield (
             "apply.export.head.landmarks: found nothing; expected a file, because landmarks.detector is "
-            "`csv` and nothing finds landmarks in images."
+            "`files` and nothing finds landmarks in images."
         )
     for name, sequence in configuration.guided.takes.items():
         if sequence == "H":
