@@ -1,7 +1,7 @@
 """Speed and memory of the files for other programs: a minute of video in every format.
 
-Each format is written by a process of its own from a sequence on disk, on the tracker's mesh or on the
-full face. Frames are counted per core second; the memory is the largest resident set, which the
+Each format is written by a process of its own from a sequence on disk, on the tracker's mesh, on the
+full face or on a head of another topology. Frames are counted per core second; the memory is the largest resident set, which the
 interpreter and its libraries are part of.
 """
 
@@ -28,20 +28,20 @@ TARGET_FPS, TARGET_MB = 30.0, 1000.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Frames, meshes and formats."""
     parser.add_argument("--frames", type=int, default=1500)
-    parser.add_argument("--topology", choices=("tracker", "full"), default="tracker")
+    parser.add_argument("--topology", choices=("tracker", "full", "head"), default="tracker")
     parser.add_argument("--formats", nargs="*", default=list(FILES), choices=list(FILES))
     parser.add_argument("--write", help=argparse.SUPPRESS)
 
 
 def take(folder: Path, frames: int):
-    """A take of the embedded model on disk, memory-mapped; and the full face."""
+    """A take of the embedded model on disk; and the model."""
     from scipy.spatial.transform import Rotation
 
     from vermilion.export.animation import Animation, HeadFrame, NamedShapes
-    from vermilion.export.full_topology import FullFace
     from vermilion.faces import procedural
     from vermilion.geometry.camera import pinhole
     from vermilion.geometry.polygons import Polygons
+    from vermilion.storage.sequences import StreamedSequence, write_frames
 
     model, rng = procedural.tracker_model(6000, 4), np.random.default_rng(0)
     time_s = np.arange(frames) / 25.0
@@ -56,42 +56,60 @@ def take(folder: Path, frames: int):
     drive = np.sin(time_s[:, None] * rng.uniform(2, 9, 40))
     path = folder / "vertices_mm.npy"
     if not path.exists():
-        shape = (frames, model.n_vertices, 3)
-        table = np.lib.format.open_memmap(path, "w+", np.float32, shape)
-        for row in range(frames):
+
+        def world(row: int) -> np.ndarray:
             local = model.vertices(None, weights[row]) + np.tensordot(drive[row], kinds, axes=1) / 6
-            table[row] = head.to_world(row, local)
-        table.flush()
+            return head.to_world(row, local)
+
+        write_frames(path, (frames, model.n_vertices, 3), map(world, range(frames)))
     shapes = NamedShapes(model.expression_names, model.expressions_mm, weights)
     coarse = Animation(
-        np.arange(frames), 25.0, np.load(path, mmap_mode="r"),
+        np.arange(frames), 25.0, StreamedSequence(path),
         Polygons.of_triangles(model.triangles), model.neutral_mm, head, shapes, 1.0, model.uv,
         pinhole("cam", 1500.0, 640, 480),
     )  # fmt: skip
+    return coarse, model
+
+
+def other_mesh(topology: str, coarse, model):
+    """What puts the take on the full face or on a head of another topology."""
+    from benchmarks.own_head import studio_head
+    from vermilion.export.full_topology import FullFace
+    from vermilion.export.head_binding import bind_head
+    from vermilion.export.head_transfer import HeadTransfer
+    from vermilion.faces import procedural
+
     studio = procedural.studio_model()
-    return coarse, FullFace.of(studio, model, coarse.neutral_mm, np.zeros(0), shapes)
+    if topology == "full":
+        return FullFace.of(studio, model, coarse.neutral_mm, np.zeros(0), coarse.shapes)
+    head, landmarks = studio_head(studio, np.zeros(0))
+    binding = bind_head(model, head, landmarks)
+    return HeadTransfer(head, binding, model, coarse.neutral_mm, coarse.shapes)
 
 
 def write_one(folder: Path, kind: str, arguments: argparse.Namespace) -> dict[str, float]:
     """Write one format; core seconds, wall seconds and memory of it."""
     from vermilion.export.packages import write_packages
     from vermilion.export.shape_basis import shape_basis
+    from vermilion.storage.sequences import StreamedSequence, write_frames
 
-    coarse, full = take(folder, arguments.frames)
+    coarse, model = take(folder, arguments.frames)
+    on_other = arguments.topology != "tracker"
+    other = other_mesh(arguments.topology, coarse, model) if on_other else None
     before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start, wall = time.process_time(), time.perf_counter()
     animation = coarse
-    if arguments.topology == "full":
-        table = folder / "full.npy"
-        shape = (arguments.frames, len(full.neutral_mm), 3)
-        sequence = np.lib.format.open_memmap(table, "w+", np.float32, shape)
-        for row in range(arguments.frames):
-            sequence[row] = full.vertices_mm(coarse, row)
-        animation = full.animation(coarse, np.load(table, mmap_mode="r"))
+    if other is not None:
+        table = folder / "other.npy"
+        shape = (arguments.frames, len(other.neutral_mm), 3)
+        rows = range(arguments.frames)
+        write_frames(table, shape, (other.vertices_mm(coarse, row) for row in rows))
+        animation = other.animation(coarse, StreamedSequence(table))
 
     def basis():
-        found = shape_basis(coarse, 0.02)
-        return full.basis(found) if arguments.topology == "full" else found
+        if arguments.topology == "full":
+            return other.basis(shape_basis(coarse, 0.02))
+        return shape_basis(animation, 0.02)
 
     out = folder / kind
     out.mkdir()

@@ -105,9 +105,9 @@ def main():
     errors, pixels, positions = [], [], []
     for frame in frames:
         scene.frame_set(frame)
-        points = world_vertices(item)
-        positions.append(points)
         ours = expected[frame - truth["first"]]
+        points = world_vertices(item)[: len(ours)]  # a glTF repeats vertices of seams at its end
+        positions.append(points)
         back = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1) * 1000.0
         errors.append(float(np.linalg.norm(back - ours, axis=1).max()))
         if cameras:

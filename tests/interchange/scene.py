@@ -14,6 +14,9 @@ from vermilion.export.albedo_texture import albedo_texture
 from vermilion.export.alembic import alembic_is_installed
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.full_topology import FullFace
+from vermilion.export.head_binding import bind_head
+from vermilion.export.head_file import HeadFile
+from vermilion.export.head_transfer import HeadTransfer
 from vermilion.export.packages import write_packages
 from vermilion.export.plates import write_plates
 from vermilion.export.shape_basis import shape_basis
@@ -23,6 +26,7 @@ from vermilion.geometry.polygons import Polygons
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.undistortion import straight_camera
+from vermilion.scan.landmarks import ScanLandmarks
 
 FPS, FIRST, COUNT = 30.0, 1001, 6
 WIDTH, HEIGHT = 640, 480
@@ -60,6 +64,25 @@ def corrected_take() -> tuple[Animation, FullFace]:
     return animation, FullFace.of(studio, tracker, neutral, identity, shapes)
 
 
+def own_head(coarse: Animation) -> HeadTransfer:
+    """Another person's head of another topology, in centimetres, with quads and a texture seam."""
+    studio, tracker = procedural.studio_model(n_identities=4), procedural.tracker_model(3000, 4)
+    vertices = 0.1 * studio.neutral_of(np.array([-0.8, 0.5, 0.3, -0.4])) + [5.0, 160.0, 0.0]
+    polygons = Polygons.with_quads(studio.triangles)
+    seam = np.where(studio.neutral_mm[polygons.corners, 0] < 0, studio.n_vertices, 0)
+    uv = np.concatenate([0.5 * studio.uv, 0.5 * studio.uv + 0.5])
+    head = HeadFile(vertices, polygons, uv, polygons.corners + seam)
+    landmarks = ScanLandmarks(vertices[studio.landmarks], np.zeros(66))
+    binding = bind_head(tracker, head, landmarks)
+    return HeadTransfer(head, binding, tracker, coarse.neutral_mm, coarse.shapes)
+
+
+def on_other_mesh(other: FullFace | HeadTransfer, coarse: Animation) -> Animation:
+    """The take on another mesh."""
+    sequence = np.stack([other.vertices_mm(coarse, row) for row in range(COUNT)])
+    return other.animation(coarse, sequence.astype(np.float32))
+
+
 def silhouette(animation: Animation, row: int, seen: Camera) -> np.ndarray:
     """What of each pixel (h, w) of the camera `seen` the mesh covers, 0 to 1, by 16 rays a pixel."""
     fine = seen.resized(4.0)
@@ -70,17 +93,22 @@ def silhouette(animation: Animation, row: int, seen: Camera) -> np.ndarray:
 
 
 def write_scene(folder: Path) -> None:
-    """Write every format of the take, on the tracker's mesh and on the full one, and the truth."""
+    """Write every format of the take, on the tracker's mesh, the full one and a head of the user, and the truth."""
     coarse, full = corrected_take()
     basis = shape_basis(coarse, 0.02)
-    sequence = np.stack([full.vertices_mm(coarse, row) for row in range(COUNT)])
-    whole = full.animation(coarse, sequence.astype(np.float32))
-    for name, animation, shapes in (("tracker", coarse, basis), ("full", whole, full.basis(basis))):
+    whole = on_other_mesh(full, coarse)
+    head = on_other_mesh(own_head(coarse), coarse)
+    for name, animation, shapes in (
+        ("tracker", coarse, basis),
+        ("full", whole, full.basis(basis)),
+        ("head", head, shape_basis(head, 0.02)),
+    ):
         out = folder / name
         out.mkdir(parents=True)
         np.save(out / "vertices_mm.npy", animation.vertices_mm)
-        colours = np.tile([0.5, 0.32, 0.25], (len(animation.neutral_mm), 1))
-        texture = albedo_texture(colours, animation.uv, animation.polygons.triangles, 256)
+        cut = animation.cut_at_seams()
+        colours = np.tile([0.5, 0.32, 0.25], (len(cut.source), 1))
+        texture = albedo_texture(colours, cut.uv, cut.polygons.triangles, 256)
         write_srgb8(out / "albedo.png", texture)
 
         def plate(frame: int, animation: Animation = animation) -> np.ndarray:

@@ -26,7 +26,7 @@ def opened(scene, tmp_path_factory):
     out = tmp_path_factory.mktemp("blender")
     found = {"renders": out}
     clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    for mesh, kinds in (("tracker", KINDS), ("full", ("usd", "usd_shapes", "gltf"))):
+    for mesh, kinds in (("tracker", KINDS), ("full", KINDS[:3]), ("head", KINDS)):
         for kind in kinds:
             result = out / f"{mesh}-{kind}.json"
             script = ROOT / "tests/interchange/blender_check.py"
@@ -39,7 +39,7 @@ def opened(scene, tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize("mesh", ["tracker", "full"])
+@pytest.mark.parametrize("mesh", ["tracker", "full", "head"])
 @pytest.mark.parametrize("kind", ["usd", "usd_shapes", "gltf"])
 def test_every_frame_is_the_corrected_mesh(opened, mesh, kind):
     found = opened[mesh, kind]
@@ -48,9 +48,17 @@ def test_every_frame_is_the_corrected_mesh(opened, mesh, kind):
     assert found["moved_mm"] > 5.0
 
 
+@pytest.mark.parametrize("mesh", ["tracker", "head"])
 @pytest.mark.parametrize("kind", ["alembic", "obj"])
-def test_alembic_and_obj_are_the_corrected_mesh(opened, kind):
-    assert max(opened["tracker", kind]["error_mm"]) < EXACT_MM
+def test_alembic_and_obj_are_the_corrected_mesh(opened, mesh, kind):
+    assert max(opened[mesh, kind]["error_mm"]) < EXACT_MM
+
+
+@pytest.mark.parametrize("kind", ["usd", "usd_shapes", "alembic", "obj"])
+def test_a_head_of_the_user_keeps_its_quads_and_its_texture_coordinates(opened, kind):
+    found = opened["head", kind]
+    assert found["sides"] == [3, 4]
+    assert found["uv_layers"] == 1
 
 
 @pytest.mark.parametrize("kind", ["usd", "usd_shapes", "alembic"])

@@ -19,7 +19,7 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])), {maxIs
 """
 
 
-@pytest.mark.parametrize("mesh", ["tracker", "full"])
+@pytest.mark.parametrize("mesh", ["tracker", "full", "head"])
 @pytest.mark.parametrize("file", ["corrected.usdc", "corrected_shapes.usdc"])
 def test_usd_passes_the_rules_of_usdchecker(scene, mesh, file):
     rules = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -31,7 +31,7 @@ def test_usd_passes_the_rules_of_usdchecker(scene, mesh, file):
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (FIRST, FIRST + COUNT - 1)
 
 
-@pytest.mark.parametrize("mesh", ["tracker", "full"])
+@pytest.mark.parametrize("mesh", ["tracker", "full", "head"])
 def test_gltf_passes_the_khronos_validator(scene, mesh):
     modules = require(ENVIRONMENT / "node/node_modules/gltf-validator").parent
     node = shutil.which("node")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,7 +87,7 @@ class Animation:
     up: str | None = None
     uv_corners: np.ndarray | None = None
 
-    @property
+    @cached_property
     def rows(self) -> list[int]:
         """Rows of the frames that have a mesh."""
         return [row for row in range(len(self.frames)) if np.isfinite(self.vertices_mm[row]).all()]

@@ -34,10 +34,14 @@ from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.undistortion import straight_camera
-from vermilion.storage.files import atomic_path
 from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
-from vermilion.storage.sequences import read_sequence, write_sequence
+from vermilion.storage.sequences import (
+    StreamedSequence,
+    read_sequence,
+    write_frames,
+    write_sequence,
+)
 from vermilion.storage.tables import read_table
 from vermilion.tracking.image_fit.overlay import samples_to_vertices
 from vermilion.tracking.result import Identity, TrackedTake
@@ -62,12 +66,9 @@ def coarse_animation(corrected, face, fit, identity, fps, unit_mm):
 def on_other_mesh(out, animation, other, name):
     """The animation on the full model or the user's head, frame by frame through a `.npy`."""
     shape = (len(animation.frames), len(other.neutral_mm), 3)
-    with atomic_path(out) as temporary:
-        table = np.lib.format.open_memmap(temporary, "w+", np.float32, shape)
-        for row in progress(range(len(table)), name):
-            table[row] = other.vertices_mm(animation, row)
-        table.flush()
-    return other.animation(animation, read_sequence(out))
+    rows = progress(range(shape[0]), name)
+    write_frames(out, shape, (other.vertices_mm(animation, row) for row in rows))
+    return other.animation(animation, StreamedSequence(out))
 
 
 def on_head(inputs, out, animation, face, options):
