@@ -28,7 +28,7 @@ CAMERA = pinhole(
     look_at(np.array([80.0, 20, 750]), np.array([0.0, -20, 60]), np.array([0.0, 1, 0])),
 )  # fmt: skip
 READING = {"tracking.external.unit_mm": None, "tracking.external.up": None}
-READING |= {"tracking.external.mesh": None}
+READING |= {"tracking.external.mesh": None, "tracking.external.flame": None}
 PLACE = {"subject": "s", "take": "shot_ft"}
 
 
@@ -125,6 +125,7 @@ def finished(scene, request):
     )  # fmt: skip
     take = {
         **PLACE, "frames": list(range(N_FRAMES)), "neutral": 0, "chunks": 2, "weights": weights,
+        "first": 0, "fps": 30.0,
     }  # fmt: skip
     run_script(
         "external/external_model", params={"cfg": base(weights=weights), "takes": [take]},
@@ -141,7 +142,7 @@ def finished(scene, request):
         "external/external_fit", wildcards={"subject": "s", "take": "shot"},
         params={
             "cfg": base(weights=weights) | {"tracking.motion.max_reprojection": 0.12},
-            "camera": "cam",
+            "camera": "cam", "fps": 30.0,
         },
         input={
             "tracker": out / "external.npz", "identity": out / "identity.npz", "coarse": own,

@@ -136,6 +136,36 @@ def test_what_is_read_goes_back_as_it_was(tmp_path, up):
     assert np.allclose(origin.upright(1000.0 * vertices), found.vertices_mm, atol=1e-3)
 
 
+LIVE_LINK = "Timecode,BlendshapeCount,JawOpen,HeadYaw\n"
+
+
+@pytest.mark.parametrize(
+    ("codes", "fps", "expected"),
+    [
+        # Frame numbers, as our own table has them.
+        (["00:00:00:04.000", "00:00:00:05.000", "00:00:00:06.000"], 25.0, [0.0, 0.1, 0.2]),
+        # Time of day: the first row is the take's first frame.
+        (["15:59:59:24.500", "16:00:00:00.500", "16:00:00:02.500"], 25.0, [0.0, 0.1, np.nan]),
+        # Twice as many rows as frames.
+        (["10:00:00:57.0", "10:00:00:58.0", "10:00:00:59.0"], 30.0, [0.0, 0.1, np.nan]),
+    ],
+)
+def test_live_link_rows_are_found_by_their_timecode(tmp_path, codes, fps, expected):
+    path = tmp_path / "l.csv"
+    rows = [f"{code},61,{0.1 * k:.1f},0.7\n" for k, code in enumerate(codes)]
+    path.write_text(LIVE_LINK + "".join(rows))
+    names, weights = read_weights(path, [4, 5, 6], first=4, fps=fps)
+    assert names == ["JawOpen"]
+    assert np.allclose(weights[:, 0], expected, equal_nan=True)
+
+
+def test_a_timecode_that_cannot_be_read_is_named(tmp_path):
+    path = tmp_path / "l.csv"
+    path.write_text(LIVE_LINK + "00:00:00:04.000,61,0,0\nnoon,61,0,0\n")
+    with pytest.raises(InputError, match=r"l\.csv: found .*a frame without a number"):
+        read_weights(path, [4, 5], first=4, fps=25.0)
+
+
 def test_weights_are_read_by_frame_and_what_is_wrong_is_named(tmp_path):
     path = tmp_path / "w.csv"
     path.write_text("frame,time_s,smile,pucker\n4,0.1,0.5,0\n6,0.2,1,0.25\n")

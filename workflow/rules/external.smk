@@ -7,7 +7,12 @@ fit.npz and C as our tracker writes, of that take.
 
 from vermilion.config.external_base import weights_path
 
-SEQUENCE_KEYS = ("tracking.external.unit_mm", "tracking.external.up", "tracking.external.mesh")
+SEQUENCE_KEYS = (
+    "tracking.external.unit_mm",
+    "tracking.external.up",
+    "tracking.external.mesh",
+    "tracking.external.flame",
+)
 
 
 def sequence_source(wildcards):
@@ -73,6 +78,8 @@ def fitted_take(take):
     return {
         **sequence_place(take),
         "frames": take.train_frames() or list(take.frames),
+        "first": take.first,
+        "fps": take.fps,
         "neutral": neutral_frame(neutral_take(take.subject)),
         "chunks": len(chunks(take)),
         "weights": "".join(sequence_weights(take)),
@@ -88,6 +95,7 @@ rule tracked_topology:
     """Writes the triangles of a sequence and what was understood of it: sequence.npz."""
     input:
         source=sequence_source,
+        flame=CONFIG.tracking.external.flame or [],
     output:
         topology=P.coarse_topology,
         sequence=P.sequence,
@@ -114,6 +122,7 @@ rule tracked_meshes:
     """Reads a chunk of a sequence, in its own world, mm."""
     input:
         source=sequence_source,
+        flame=CONFIG.tracking.external.flame or [],
         sequence=P.sequence,
     output:
         meshes=P.coarse,
@@ -246,6 +255,7 @@ if EXTERNAL:
         params:
             cfg=cfg_of("tracking.external.base", "tracking.motion.max_reprojection"),
             code=code_of("external/external_fit"),
+            fps=take_fps,
             camera=mono_camera,
         script:
             "../scripts/external/external_fit.py"

@@ -67,6 +67,7 @@ def _data_paths(
         "landmarks.files.path": landmarks.files.path,
         "landmarks.key_frames.files.path": landmarks.key_frames.files.path,
         "tracking.external.base.weights": tracking.external.base.weights,
+        "tracking.external.flame": tracking.external.flame,
         "evaluation.truth": configuration.evaluation.truth,
         "apply.export.topology": configuration.apply.head_of("{subject}"),
         "apply.export.head.landmarks": configuration.apply.export.head.landmarks,

@@ -103,13 +103,14 @@ def weights_path(configuration: Configuration, sequence: Take) -> str | None:
 def missing_files(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
     """A sentence for each file of the base that the configuration names and that is not there."""
     base, sequences = configuration.tracking.external.base, sequences_of(takes)
-    named = {"landmarks": [base.landmarks], "model": [base.model]}
-    named["weights"] = [weights_path(configuration, row) for row in sequences.values()]
+    named = {"base.landmarks": [base.landmarks], "base.model": [base.model]}
+    named["base.weights"] = [weights_path(configuration, row) for row in sequences.values()]
+    named["flame"] = [configuration.tracking.external.flame]
     for key, paths in named.items():
         for path in paths if sequences else []:
             if path and not Path(path).is_file():
                 yield (
-                    f"tracking.external.base.{key}: found no '{path}'; expected a file. Correct the path "
+                    f"tracking.external.{key}: found no '{path}'; expected a file. Correct the path "
                     "(relative to the folder where the workflow starts)."
                 )
 

@@ -245,6 +245,11 @@ class ExternalConfig(StageConfig):
         None,
         description="Path or name of the mesh in files that have several. Empty: the only one that moves.",
     )
+    flame: str | None = Field(
+        None,
+        min_length=1,
+        description="Your FLAME model as `.npz` (docs/interchange.md), for sequences of its parameters.",
+    )
     base: ExternalBaseConfig = section(
         ExternalBaseConfig, "The sequence as the base of the correction (docs/other_trackers.md)."
     )

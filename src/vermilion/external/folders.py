@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vermilion.external.flame import is_flame, read_flame, read_flame_folder
 from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_polygons
 from vermilion.geometry.polygons import Polygons
@@ -13,10 +14,13 @@ from vermilion.storage.errors import InputError
 
 
 def read_folder(request: Request) -> RawSequence:
-    """Read a file a frame; a file that is missing or damaged costs its frame.
+    """Read a file a frame, meshes or parameters of FLAME; one that is missing or damaged costs its frame.
 
     Raises InputError where no frame can be read, or one has another topology than those before.
     """
+    parameters = numbered_files(request.path, [".npz"])
+    if parameters:
+        return read_flame_folder(request, parameters)
     paths = numbered_files(request.path, MESH_SUFFIXES)
     lost = request.absent(paths)
     meshes: dict[int, np.ndarray] = {}
@@ -81,7 +85,7 @@ def _whole(values: np.ndarray) -> bool:
 
 
 def read_archive(request: Request) -> RawSequence:
-    """Read `vertices_mm` (or `vertices`) (F, V, 3), `triangles` or `quads`, and `frames` if there.
+    """Read `vertices_mm` (or `vertices`) (F, V, 3), `triangles` or `quads`, and `frames` if there; or FLAME's.
 
     Raises InputError where the arrays are missing or of other shapes.
     """
@@ -89,6 +93,8 @@ def read_archive(request: Request) -> RawSequence:
         request.path, "mesh sequence", remedy="Export it again: vertices_mm (F, V, 3), triangles (T, 3).",
         **request.place,
     )  # fmt: skip
+    if is_flame(data):
+        return read_flame(request, data)
     named = "vertices_mm" in data
     vertices = data["vertices_mm" if named else "vertices"]
     faces = data["quads" if "quads" in data else "triangles"]

@@ -69,13 +69,15 @@ def read_tracked(
     fps: float | None = None,
     mesh: str | None = None,
     up: str | None = None,
+    flame: str | Path | None = None,
     **place: Any,
 ) -> MeshSequence:
     """Read some frames of a mesh sequence.
 
     Args:
         source: folder of numbered `.obj`, `.ply` or `.stl`; `.npz` with `vertices_mm` (F, V, 3),
-            `triangles` (T, 3) and optionally `frames` (F,), else counted from 0; USD; Alembic; glTF.
+            `triangles` (T, 3) and optionally `frames` (F,), else counted from 0; USD; Alembic; glTF;
+            `.npz` with parameters of FLAME, or a folder with one a frame.
         frames: numbers of the frames to read.
         unit_mm: length of the file's unit, mm; None: that which the file names, else a guess from
             the mesh's size.
@@ -83,13 +85,16 @@ def read_tracked(
         mesh: path or name of the mesh where the file has several.
         up: axis of the file that is up, `y` or `z`: a sequence with z up is turned to y up. None: it
             is left as it is.
+        flame: the user's FLAME model (`.npz`), for sequences of its parameters.
         place: subject and take, for error messages.
 
     Raises:
         InputError: no frame can be read, topologies differ, or the file has none of these forms.
     """
     source = Path(source)
-    request = Request(source, [int(frame) for frame in frames], fps, mesh, place)
+    request = Request(
+        source, [int(frame) for frame in frames], fps, mesh, place, Path(flame) if flame else None
+    )
     if source.is_dir():
         raw = _checked(read_folder(request), request)
     elif source.suffix.lower() in READERS and source.is_file():

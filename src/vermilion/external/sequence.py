@@ -46,6 +46,7 @@ class Request:
         fps: frames a second, for files that count seconds; None: the file's own rate.
         mesh: path of the mesh in the file; None: the one that moves.
         place: subject and take, for error messages.
+        flame: the user's FLAME model, for sequences of its parameters; None: none.
     """
 
     path: Path
@@ -53,6 +54,7 @@ class Request:
     fps: float | None = None
     mesh: str | None = None
     place: dict[str, Any] = field(default_factory=dict)
+    flame: Path | None = None
 
     def error(self, found: str, expected: str, hint: str, **more: Any) -> InputError:
         """The error of this file."""

@@ -42,7 +42,10 @@ def main(snakemake):
     weights = None
     if inputs.get("weights"):
         names = list(model.expression_names)
-        _, weights = read_weights(inputs.weights, track.frames, names=names, **place)
+        first = int(track.frames[0])
+        _, weights = read_weights(
+            inputs.weights, track.frames, names=names, first=first, fps=params.fps, **place
+        )
     limit = cfg["tracking.motion.max_reprojection"]
     fit = external_take(model, own, person.neutral_mm, weights, placement, camera, track, limit)
     fit.save(snakemake.output.fit)

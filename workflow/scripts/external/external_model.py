@@ -26,8 +26,9 @@ def own_weights(takes, frames):
     named, parts = None, []
     for take, numbers in zip(takes, frames, strict=True):
         names, weights = read_weights(
-            take["weights"], numbers, names=named, subject=take["subject"], take=take["take"]
-        )
+            take["weights"], numbers, names=named, first=take["first"], fps=take["fps"],
+            subject=take["subject"], take=take["take"],
+        )  # fmt: skip
         named = names
         parts.append(weights)
     return named, np.concatenate(parts)

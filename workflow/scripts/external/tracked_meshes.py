@@ -24,6 +24,7 @@ def main(snakemake):
         origin.unit_mm,
         up=params.cfg["tracking.external.up"],
         mesh=params.cfg["tracking.external.mesh"],
+        flame=params.cfg["tracking.external.flame"],
         fps=params.fps,
         **place,
     )

@@ -21,7 +21,9 @@ def first_mesh(source, frames, **options):
 
 def main(snakemake):
     cfg, output = snakemake.params.cfg, snakemake.output
-    options = {name: cfg[f"tracking.external.{name}"] for name in ("unit_mm", "up", "mesh")}
+    options = {
+        name: cfg[f"tracking.external.{name}"] for name in ("unit_mm", "up", "mesh", "flame")
+    }
     found = first_mesh(
         snakemake.input.source,
         snakemake.params.frames,
