@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-interchange lint format docs reference clean
+.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-kills test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -23,6 +23,7 @@ help:
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make test-latest the quick tests with the newest versions of all packages"
 	@echo "make test-slurm  the tiny capture on a real Slurm of two nodes (as root)"
+	@echo "make test-kills  200 kills over the whole tiny run, 20 full disks (as root)"
 	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
 	@echo "make docs        build the documentation site (results/site); also regenerates the"
@@ -97,6 +98,12 @@ $(VENV)-interchange.ready: requirements.interchange.lock tools/setup_interchange
 # The malformed inputs with more seeds than in `make test`; about a minute of one core for 20.
 test-faults: setup
 	VERMILION_FAULT_SEEDS=$${VERMILION_FAULT_SEEDS:-20} $(BIN)/python -m pytest -p no:cacheprovider tests/faults
+
+# 200 kills over the whole tiny run, 20 full disks; about an hour of one core. As root; VERMILION_KILLS_FOLDER=
+# keeps the undisturbed run that the others are compared with.
+test-kills: setup
+	VERMILION_KILLS=$${VERMILION_KILLS:-200} VERMILION_FULL_DISKS=$${VERMILION_FULL_DISKS:-10} \
+	    $(BIN)/python -m pytest -p no:cacheprovider -s tests/workflow/test_kills.py tests/workflow/test_disks.py
 
 # A real Slurm of two nodes on this machine; needs root. VERMILION_TEST_SLURM=all compares a whole run.
 test-slurm: setup

@@ -10,6 +10,7 @@ if not workflow.configfiles:
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/run.smk"
 include: "workflow/rules/face_model.smk"
 include: "workflow/rules/studio.smk"
 include: "workflow/rules/capture.smk"
@@ -84,6 +85,8 @@ rule generic:
 
 onstart:
     refuse_impossible_jobs()
+    mend_clock()
+    JOBS_STARTED.append(True)
 
 
 onsuccess:

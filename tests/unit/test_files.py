@@ -1,16 +1,20 @@
 """Whole files or none; tables, sequences and quality rows round-trip."""
 
+import errno
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh, write_ply
+from vermilion.storage import unwritable
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder, atomic_path
 from vermilion.storage.quality import QualityRow, flagged_frames, write_quality
 from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table, write_table
+from vermilion.storage.unwritable import UnwritableError
 
 
 def test_failing_writer_leaves_nothing(tmp_path):
@@ -100,3 +104,45 @@ def test_flagged_frames_and_warnings_carry_their_reason(tmp_path):
 def test_invalid_row_needs_a_reason(tmp_path):
     with pytest.raises(ValueError, match="needs a reason"):
         write_quality(tmp_path / "q.tsv", "s", "t", "x", [QualityRow(0, False)])
+
+
+class NoRoom(OSError):
+    """What a write says on a full disk."""
+
+    def __init__(self):
+        super().__init__(errno.ENOSPC, "No space left on device")
+
+
+def test_full_disk_is_one_sentence_that_names_the_file(tmp_path):
+    with (
+        pytest.raises(UnwritableError, match=r"a\.npy: found that the disk is full.*again"),
+        atomic_path(tmp_path / "a.npy"),
+    ):
+        raise NoRoom
+    with pytest.raises(UnwritableError, match="disk is full"), atomic_folder(tmp_path / "f"):
+        raise RuntimeError("of a library") from NoRoom()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_file_of_a_silent_writer_on_a_full_disk_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(unwritable, "_free_bytes", lambda folder: 4096)
+    with (
+        pytest.raises(UnwritableError, match=r"disk is full \(4 kB left\)"),
+        atomic_path(tmp_path / "a.png") as temporary,
+    ):
+        temporary.write_bytes(b"cut off, and nothing was said")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_errors_of_a_writer_stay_what_they_are(tmp_path):
+    elsewhere = PermissionError(errno.EACCES, "Permission denied", "/elsewhere/input.png")
+    with pytest.raises(PermissionError), atomic_path(tmp_path / "a.txt"):
+        raise elsewhere
+    with pytest.raises(InputError), atomic_path(tmp_path / "a.txt"):
+        raise InputError("x", "y", "z") from NoRoom()
+
+
+def test_folder_without_permission_is_one_sentence(tmp_path):
+    here = PermissionError(errno.EACCES, "Permission denied", str(tmp_path / "a.txt"))
+    with pytest.raises(UnwritableError, match=r"a\.txt: found no permission to write"):
+        raise unwritable.explain(here, tmp_path / "a.txt")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 
 import numpy as np
@@ -14,7 +15,7 @@ from vermilion.capture.rig import image_sizes, rig_cameras
 from vermilion.geometry.camera import look_at, pinhole, write_cameras
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import ForbiddenInputError, InputError
 
 FRAMES = range(4)
 CAMERAS = ("a", "b", "c")
@@ -123,3 +124,12 @@ def test_one_camera_gets_an_assumed_focal_and_several_an_error(tmp_path):
     assert known.summary()["calibrated"] and known.cameras["cam"].params[0] == 1024.0
     with pytest.raises(InputError, match=r"2 cameras without a calibration.*cameras/"):
         rig_cameras(tmp_path, {"a": (8, 8), "b": (8, 8)}, "a", board)
+
+
+def test_image_that_may_not_be_read_stops_the_job(capture, monkeypatch):
+    """Lost permission is no fault of the frame: it is not given up in silence."""
+    path = capture / "frames" / "a" / "000002.png"
+    may = os.access
+    monkeypatch.setattr(os, "access", lambda file, mode: file != path and may(file, mode))
+    with pytest.raises(ForbiddenInputError, match=r"000002\.png: found no permission to read"):
+        capture_manifest(capture, "s", "t", FRAMES)

@@ -88,3 +88,22 @@ def test_without_a_terminal_a_line_a_stage():
     ):
         line.show(text, now_s)
     assert out.getvalue().splitlines() == ["[1/9] a: 1 of 2", "[2/9] b", "[2/9] b"]
+
+
+def test_a_reason_that_a_full_disk_did_not_keep_is_still_told(tmp_path):
+    log = tmp_path / "logs/apply/s1.log"
+    code = (
+        "import sys; print('rule apply:\\n    jobid: 3\\n\\nfile a.npy: found that the disk is full.\\n'"
+        f"'Log: {log}\\n\\nError in rule apply:\\n    jobid: 3\\n    log: {log} (check log)'); sys.exit(1)"
+    )
+    terminal = io.StringIO()
+    assert run_workflow([sys.executable, "-c", code], tmp_path / "s.log", stream=terminal) == 1
+    assert "apply failed: file a.npy: found that the disk is full." in terminal.getvalue()
+
+
+def test_snakemake_without_room_is_one_sentence(tmp_path):
+    code = "raise OSError(28, 'No space left on device')"
+    terminal = io.StringIO()
+    assert run_workflow([sys.executable, "-c", code], tmp_path / "s.log", stream=terminal) == 1
+    assert "found that the disk is full" in terminal.getvalue()
+    assert "Traceback" not in terminal.getvalue()

@@ -86,7 +86,6 @@ def test_killed_run(finished, whole):
     wait_for_job(run, "apply")
     os.killpg(run.pid, signal.SIGKILL)
     run.wait(timeout=60)
-    finished.snakemake("--unlock")
     finished.snakemake()
 
 

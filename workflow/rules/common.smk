@@ -34,7 +34,6 @@ from vermilion.config.regressors import (
     trained_on,
     with_variants,
 )
-from vermilion.provenance import checksums
 from vermilion.provenance.cache import roles_of, wildcards_of
 from vermilion.provenance.fingerprint import fingerprint
 
@@ -274,25 +273,3 @@ def mono_camera(wildcards):
         return "cam"
     folders = sorted(Path(take.source).glob("frames/*/"))
     return folders[0].name if folders else "cam"
-
-
-def record_checksums():
-    """Write the ledger of checksums for every output whose job has ended."""
-    if not IS_MAIN_PROCESS or workflow.dryrun:
-        return
-    # Snakemake may have read the record of its last job before it was written, and keeps what it read.
-    workflow.persistence.deactivate_cache()
-    jobs, ends = {}, {}
-    for job in workflow.dag.jobs:
-        for output in job.output:
-            path = Path(output)
-            if str(output).startswith(f"{R}/") and path.exists():
-                jobs[path] = Path(job.output[0])
-                ends[path] = getattr(workflow.persistence.metadata(output), "endtime", None)
-    try:
-        refused = checksums.record(Path(R), jobs, ends.get)
-    except VermilionError as error:
-        print(error, file=sys.stderr)
-        return
-    for damage in refused:
-        print(f"not to be trusted: {damage.path}: {damage.reason}", file=sys.stderr)

@@ -18,11 +18,13 @@ from pathlib import Path
 
 from vermilion.app.results import summary
 from vermilion.app.snakemake_command import snakemake_command
-from vermilion.app.workflow import run_workflow
+from vermilion.app.workflow import TELLING, run_workflow
 from vermilion.config.load import read_keys
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take, read_takes
+from vermilion.provenance.run_lock import refuse_if_held
 from vermilion.storage.logfile import FAILED_SUFFIX
+from vermilion.storage.unwritable import is_of_the_disk, refuse_if_full
 
 
 def failures(results: Path, takes: list[Take]) -> dict[str, str]:
@@ -71,9 +73,14 @@ def run_all(
 
     Returns:
         (exit code of the first run, takes that were left out -> why); raises SystemExit where what
-        failed belongs to no take.
+        failed belongs to no take or could not write, VermilionError where another run is at work
+        in the folder, or the disk is full.
     """
     skipped, first = dict(left_out), 0
+    if not TELLING.intersection(options):
+        refuse_if_held(results)
+        refuse_if_full(results)
+        refuse_if_full(Path(".snakemake").absolute())
     while True:
         clear_failures(results)
         words = command(configuration, skipped, options)
@@ -82,7 +89,7 @@ def run_all(
         new = {n: why for n, why in failures(results, takes).items() if n not in skipped}
         if code == 0:
             return first, skipped
-        if not new:
+        if not new or any(is_of_the_disk(why) for why in new.values()):
             raise SystemExit(code)
         skipped |= new
         if alone:

@@ -41,6 +41,7 @@ class RunProgress:
     Attributes:
         expected_s: rule -> seconds that one of its jobs takes about, as long as none has ended.
         cores: jobs that run side by side.
+        said: log of a job -> why it failed, as it said it on the terminal.
     """
 
     expected_s: Callable[[str], float] = lambda rule: 3.0
@@ -50,6 +51,8 @@ class RunProgress:
     jobs: dict[str, int] = field(default_factory=dict)
     running: dict[str, Job] = field(default_factory=dict)
     failed: list[Job] = field(default_factory=list)
+    said: dict[Path, str] = field(default_factory=dict)
+    _paragraph: list[str] = field(default_factory=list)
     _ended: dict[str, list[float]] = field(default_factory=dict)
     _open: Job | None = None
     _counting: bool = False
@@ -58,6 +61,7 @@ class RunProgress:
     def feed(self, line: str, now_s: float) -> None:
         """Take note of a line that Snakemake printed at a time."""
         line = line.rstrip("\n")
+        self._listen(line)
         if line == "Job stats:":
             self._counting, self.jobs = True, {}
         elif self._counting and not line:
@@ -74,6 +78,12 @@ class RunProgress:
             self._finish(found[1], now_s)
         elif found := _STEPS.match(line):
             self.done, self.total = int(found[1]), int(found[2])
+
+    def _listen(self, line: str) -> None:
+        """Keep what a failed job says before it names its log (`storage.logfile`)."""
+        if line.startswith("Log: "):
+            self.said[Path(line.removeprefix("Log: "))] = "\n".join(self._paragraph)
+        self._paragraph = [*self._paragraph, line][-20:] if line else []
 
     def line(self, now_s: float) -> str:
         """One line for the terminal."""

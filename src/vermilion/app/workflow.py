@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import shutil
 import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO
 
 from vermilion.app.run_progress import RunProgress
 from vermilion.storage.logfile import FAILED_SUFFIX
+from vermilion.storage.unwritable import explain, full_disk
 
 #: Options with which Snakemake tells something instead of running jobs.
-TELLING = ("-n", "--dry-run", "--dryrun", "--unlock", "--lint", "--list", "--summary", "--dag")
+TELLING = frozenset(
+    ("-n", "--dry-run", "--dryrun", "--unlock", "--lint", "--list", "--summary", "--dag")
+)
 _EVERY_S = 1.0
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+#: Lines of what Snakemake printed last, to say what failed before any job.
+_LAST_LINES = 1000
 #: Without a terminal, a line is printed where the stage changes, and this often.
 _PLAIN_EVERY_S = 20.0
 
@@ -69,28 +78,34 @@ def run_workflow(
     Returns:
         exit code of Snakemake.
     """
-    if any(word in TELLING for word in words):
+    if TELLING.intersection(words):
         return subprocess.run(words, check=False).returncode
     stream = sys.stderr if stream is None else stream
     state, started = RunProgress(cores=_cores(words)), time.monotonic()
     if expected_s is not None:
         state.expected_s = expected_s
-    log.parent.mkdir(parents=True, exist_ok=True)
-    code = _follow(words, log, state, ProgressLine(stream))
+    code, printed = _follow(words, log, state, ProgressLine(stream))
     if code == 0 and state.total:
         print(f"{state.total} steps in {(time.monotonic() - started) / 60:.1f} min", file=stream)
     elif code:
-        print(_failure(state, log), file=stream)
+        print(_failure(state, log, printed), file=stream)
     stream.flush()
     return code
 
 
-def _follow(words: Sequence[str], log: Path, state: RunProgress, shown: ProgressLine) -> int:
-    """Run the command, keep what it prints, show the line meanwhile; returns its exit code."""
+def _follow(
+    words: Sequence[str], log: Path, state: RunProgress, shown: ProgressLine
+) -> tuple[int, list[str]]:
+    """Run the command, keep what it prints, show the line meanwhile; returns its exit code and last lines."""
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        kept: IO[str] | None = open(log, "w", encoding="utf-8")  # noqa: SIM115 - closed below
+    except OSError as error:
+        raise explain(error, log) from error
     process = subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
     )
-    ended, lock = threading.Event(), threading.Lock()
+    ended, lock, last = threading.Event(), threading.Lock(), deque[str](maxlen=_LAST_LINES)
 
     def refresh() -> None:
         while not ended.wait(_EVERY_S):
@@ -102,14 +117,13 @@ def _follow(words: Sequence[str], log: Path, state: RunProgress, shown: Progress
     ticker = threading.Thread(target=refresh, daemon=True)
     ticker.start()
     try:
-        with open(log, "w", encoding="utf-8") as kept:
-            assert process.stdout is not None  # a pipe
-            for line in process.stdout:
-                kept.write(line)
-                kept.flush()
-                with lock:
-                    state.feed(line, time.monotonic())
-        return process.wait()
+        assert process.stdout is not None  # a pipe
+        for line in process.stdout:
+            last.append(line)
+            kept = _keep(kept, line)
+            with lock:
+                state.feed(line, time.monotonic())
+        return process.wait(), list(last)
     except KeyboardInterrupt:
         process.wait()  # the terminal has told Snakemake as well
         raise
@@ -117,9 +131,24 @@ def _follow(words: Sequence[str], log: Path, state: RunProgress, shown: Progress
         ended.set()
         ticker.join()
         shown.clear()
+        if kept is not None:
+            kept.close()
 
 
-def _failure(state: RunProgress, log: Path) -> str:
+def _keep(log: IO[str] | None, line: str) -> IO[str] | None:
+    """Add a line to the log; None from when the disk is full: the run and its message go on without."""
+    if log is not None:
+        try:
+            log.write(line)
+            log.flush()
+        except OSError:
+            with contextlib.suppress(OSError):
+                log.close()
+            return None
+    return log
+
+
+def _failure(state: RunProgress, log: Path, printed: Sequence[str]) -> str:
     """What failed and why, with the log of each job; else the end of what Snakemake said."""
     seen, parts = set(), []
     for job in state.failed:
@@ -127,12 +156,14 @@ def _failure(state: RunProgress, log: Path) -> str:
             continue
         seen.add(job.log)
         reason = Path(f"{job.log}{FAILED_SUFFIX}")
-        why = reason.read_text(encoding="utf-8").strip() if reason.is_file() else "see its log"
+        why = reason.read_text(encoding="utf-8").strip() if reason.is_file() else ""
+        why = why or state.said.get(job.log) or "see its log"  # a full disk keeps no reason
         parts.append(f"{job.rule} failed: {why}\nLog: {job.log}")
     if parts:
         return "\n".join(["", *parts, ""])
-    text = log.read_text(encoding="utf-8", errors="replace")
-    lines = text.strip().splitlines()
+    lines = "".join(printed).strip().splitlines()
+    if any(os.strerror(number) in line for line in lines for number in _NO_ROOM):
+        return f"\n{full_disk(Path('.snakemake').absolute())}\n"  # Snakemake's own files
     starts = [n for n, line in enumerate(lines) if "Error" in line or "Exception" in line]
     return "\n".join(["", *lines[starts[0] if starts else -12 :][:60], f"Log: {log}", ""])
 

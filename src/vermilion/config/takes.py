@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Literal, cast, get_args
 
@@ -73,10 +74,24 @@ class Take:
 
     def test_frames(self) -> list[int]:
         """Frames that the evaluation measures: held out of training, of a take with a test split."""
-        return [] if self.split == "none" else [f for f in self.frames if self.held_out(f)]
+        return [] if self.split == "none" else list(_held_out(self)[0])
 
     def train_frames(self) -> list[int]:
-        return [f for f in self.frames if not self.held_out(f)]
+        return list(_held_out(self)[1])
+
+
+@cache
+def _held_out(take: Take) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Frames of a take that are held out, and the others. The workflow asks for them for many jobs."""
+    if take.split.startswith("test:"):
+        ranges = stretches(take.split)
+    else:
+        ranges = [] if take.split == "train" else [(take.first, take.last)]
+    held = {frame for low, high in ranges for frame in range(low, high + 1)}
+    parts: tuple[list[int], list[int]] = ([], [])
+    for frame in take.frames:
+        parts[frame not in held].append(frame)
+    return tuple(parts[0]), tuple(parts[1])
 
 
 def stretches(split: str) -> list[tuple[int, int]]:

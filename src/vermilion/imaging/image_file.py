@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import OpenImageIO as oiio
 
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import ForbiddenInputError, InputError
 
 #: An image with a longer side or more pixels is no frame of a camera: a damaged header, or a small
 #: file that unpacks to gigabytes.
@@ -22,7 +23,7 @@ def open_image(path: Path, **place) -> oiio.ImageInput:
     """Open an image file at its first part, alpha left apart.
 
     Raises InputError with the `place` (subject, take, camera, frame) where there is no such file, it
-    is no image, or its header says a size over the limits.
+    is no image, or its header says a size over the limits; ForbiddenInputError where it may not be read.
     """
     if not path.is_file():
         raise InputError(
@@ -34,6 +35,14 @@ def open_image(path: Path, **place) -> oiio.ImageInput:
         )
     if path.stat().st_size == 0:
         raise _unreadable(path, "it is empty", place)
+    if not os.access(path, os.R_OK):
+        raise ForbiddenInputError(
+            "no permission to read",
+            "an image that this user may read",
+            f"Give the permission: `ls -l {path}` says who has it.",
+            path=path,
+            **place,
+        )
     stream = oiio.ImageInput.open(str(path), _UNASSOCIATED)
     if not stream:
         raise _unreadable(path, _last_error(), place)

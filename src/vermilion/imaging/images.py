@@ -169,8 +169,8 @@ def _write(path: str | Path, spec: oiio.ImageSpec, pixels: np.ndarray) -> None:
         if not stream or not stream.open(str(temporary), spec):
             raise OSError(f"cannot write {path}: {oiio.geterror()}")
         written = stream.write_image(pixels)
-        stream.close()
-        if not written:
+        closed = stream.close()
+        if not (written and closed):
             raise OSError(f"cannot write {path}: {stream.geterror()}")
 
 

@@ -7,14 +7,13 @@ next run makes exactly these again.
 
 from __future__ import annotations
 
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from vermilion.storage.errors import InputError
-from vermilion.storage.files import sha256_of
+from vermilion.storage.files import remove_result, sha256_of
 from vermilion.storage.tables import read_table, write_table
 
 LEDGER = "checksums.tsv"
@@ -182,10 +181,7 @@ def remove_damaged(results: Path, damage: list[Damage]) -> list[Path]:
     jobs = {entry["job"] for entry in known.values() if results / entry["output"] in wrong}
     outputs = sorted({results / e["output"] for e in known.values() if e["job"] in jobs})
     for output in outputs:
-        if output.is_dir() and not output.is_symlink():
-            shutil.rmtree(output)
-        else:
-            output.unlink(missing_ok=True)
+        remove_result(output)
     return outputs
 
 

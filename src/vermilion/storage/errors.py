@@ -58,6 +58,10 @@ class RefusedInputError(InputError):
     """A file that is whole, but of a kind that is not read; the message says how to convert it."""
 
 
+class ForbiddenInputError(PlacedError):
+    """A file that may not be read: no fault of the file, so that no frame is given up for it."""
+
+
 class ConfigurationError(VermilionError):
     """The configuration or the take sheet is wrong; lists every problem at once."""
 

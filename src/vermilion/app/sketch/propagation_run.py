@@ -145,6 +145,9 @@ class PropagationRun:
 
     def _failure(self) -> str:
         printed = "\n".join(self._lines)
+        held = [line.strip() for line in self._lines if "another run at work in it" in line]
+        if held:
+            return held[0]
         if "LockException" in printed or "cannot be locked" in printed:
             return (
                 "Another run of the workflow works on these results. Wait until it has ended; if "
