@@ -1,11 +1,10 @@
-"""A run whose jobs, whose Snakemake, or both are killed at random moments, and the same command again."""
+"""Runs whose jobs, whose Snakemake, or both are killed at random moments, and the same command again."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import random
-import shutil
 import signal
 import subprocess
 import time
@@ -17,6 +16,7 @@ import psutil
 
 from tests.workflow.conftest import Project
 from vermilion.provenance import checksums
+from vermilion.storage.files import remove_result
 from vermilion.storage.tables import read_table
 
 #: Not compared: logs, measured times, and the ledger, which has file times.
@@ -67,11 +67,14 @@ class Results:
 
 @dataclass
 class DisturbedRun:
-    """Runs of one command in one copy of the project, killed by a seeded chance.
+    """Parts of a finished run made again and again, by one command for each part, killed by a seeded chance.
 
     Attributes:
         expected: digests of an undisturbed run.
         options: further words of the command.
+        kills: kind -> how often.
+        stages: rule -> how often one of its jobs was at work at a kill.
+        completed: how many parts were made whole.
     """
 
     project: Project
@@ -79,15 +82,17 @@ class DisturbedRun:
     seed: int
     options: tuple[str, ...] = ()
     kills: Counter = field(default_factory=Counter)
+    stages: Counter = field(default_factory=Counter)
     completed: int = 0
 
     def __post_init__(self):
         self.chance = random.Random(self.seed)
         self.results = Results(self.project.results)
         self.printed = self.project.folder / "disturbed.log"
+        self.targets: list[str] = []
 
-    def kill(self, count: int, pauses_s: tuple[float, ...] = (4.0, 4.0, 40.0)) -> None:
-        """Kill `count` times; between the kills the same command goes on, from part of the results where all is made.
+    def kill(self, count: int, pauses_s: tuple[float, ...] = (4.0, 4.0, 30.0)) -> None:
+        """Kill `count` times; after each kill the same command goes on.
 
         Each time one of `pauses_s` is the longest that is waited, so that long jobs end as well; mostly from
         when a job runs, sometimes from when Snakemake starts.
@@ -95,6 +100,8 @@ class DisturbedRun:
         run = None
         while self.kills.total() < count:
             if run is None:
+                if not self.targets:
+                    self._remove_some()
                 run = self._start()
                 if self.chance.random() < 0.85:
                     self._wait(run, 120.0, until_a_job_runs=True)
@@ -115,10 +122,15 @@ class DisturbedRun:
             self.check_whole()
 
     def finish(self) -> None:
-        """The same command until it succeeds; then nothing is missing, nothing left over or to be done."""
-        run = self._start()
-        run.wait(timeout=1800)
+        """Everything: nothing is missing, nothing is left over or to be done, and no checksum differs."""
+        for targets in (self.targets, []):
+            self.targets = targets
+            run = self._start()
+            run.wait(timeout=1800)
+            assert run.returncode == 0, self._tail()
         self._ended(run)
+        assert self.project.would_run(*self.options) == {}
+        assert checksums.find_damage(self.project.results) == []
 
     def check_whole(self) -> None:
         """Whatever has its final name is whole, whenever it is looked at."""
@@ -130,7 +142,7 @@ class DisturbedRun:
         """The command, in a process group of its own."""
         with open(self.printed, "a") as log:
             return subprocess.Popen(
-                self.project.command(*self.options),
+                self.project.command(*self.options, *self.targets),
                 cwd=self.project.folder,
                 env=self.project.environment(),
                 stdout=log,
@@ -141,10 +153,11 @@ class DisturbedRun:
     def _kill(self, run: subprocess.Popen, kind: str) -> bool:
         """Kill a job, Snakemake, or all; False where no job runs that could be killed."""
         family = _descendants(run.pid)
+        jobs = [process for process in family if _is_job(process)]
+        if kind == "job" and not jobs:
+            return False
+        self.stages.update([_stage(process) for process in jobs] or ["Snakemake alone"])
         if kind == "job":
-            jobs = [process for process in family if _is_job(process)]
-            if not jobs:
-                return False
             self.chance.choice(jobs).kill()
             return True
         if kind == "both":
@@ -165,22 +178,21 @@ class DisturbedRun:
         found = self.results.digests()
         assert found == self.expected, set(found) ^ set(self.expected)
         assert self.results.hidden() == []
-        assert self.project.would_run(*self.options) == {}
+        if self.completed % 10 == 9:
+            assert self.project.would_run(*self.options) == {}
         self.completed += 1
-        print(f"complete {self.completed} times", flush=True)
-        self._remove_some()
+        self.targets = []
+        print(f"{self.completed} parts whole", flush=True)
 
     def _remove_some(self) -> None:
-        """Take away what some jobs made, or everything, so that there is something to be killed."""
-        if self.completed % 6 == 5:
-            shutil.rmtree(self.project.results)
-            return
+        """Take away what some jobs made; the command makes these again."""
         ledger = read_table(self.project.results / checksums.LEDGER)
-        jobs = sorted(set(ledger["job"]))
-        for job in self.chance.sample(jobs, self.chance.randint(1, 8)):
+        jobs = self.chance.sample(sorted(set(ledger["job"])), self.chance.randint(2, 8))
+        for job in jobs:
             for output in set(ledger["output"][ledger["job"] == job]):
-                path = self.project.results / output
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+                remove_result(self.project.results / output)
+        place = self.project.results.relative_to(self.project.folder)
+        self.targets = [str(place / job) for job in jobs]
 
     def _wait(self, run: subprocess.Popen, seconds: float, until_a_job_runs: bool = False) -> None:
         end = time.monotonic() + seconds
@@ -198,6 +210,15 @@ def _descendants(pid: int) -> list[psutil.Process]:
         return psutil.Process(pid).children(recursive=True)
     except psutil.NoSuchProcess:
         return []
+
+
+def _stage(process: psutil.Process) -> str:
+    """The rule of a job, by the name of its script."""
+    try:
+        scripts = [part for part in process.cmdline() if ".snakemake/scripts" in part]
+        return Path(scripts[0]).name.split(".")[1]
+    except (psutil.NoSuchProcess, IndexError):
+        return "ending"
 
 
 def _is_job(process: psutil.Process) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import copy_project
+from tests.workflow.conftest import Project, copy_project
 from tests.workflow.disturbed_run import DisturbedRun, Results
 
 pytestmark = pytest.mark.slow
@@ -18,31 +18,25 @@ SEED = int(os.environ.get("VERMILION_KILLS_SEED", "1"))
 
 def test_a_few_kills_of_a_finished_run(finished):
     """Part of the results is made again under kills."""
-    expected = Results(finished.results).digests()
-    run = DisturbedRun(finished, expected, SEED)
-    run.completed = 1
-    run._remove_some()
-    run.kill(SAMPLE, pauses_s=(4.0,))
+    run = DisturbedRun(finished, Results(finished.results).digests(), SEED)
+    run.kill(SAMPLE, pauses_s=(3.0,))
     run.finish()
 
 
 @pytest.mark.skipif(not ALL, reason="make test-kills: about an hour")
 def test_kills_over_the_whole_graph(tmp_path_factory):
-    """From nothing, over and over, until there were VERMILION_KILLS kills."""
+    """Parts of the whole tiny run, from rendering to the report, until there were VERMILION_KILLS kills."""
     kept = os.environ.get("VERMILION_KILLS_FOLDER")
     place = Path(kept) if kept else tmp_path_factory.mktemp("kills")
-    place.mkdir(parents=True, exist_ok=True)
-    if not (place / "expected").is_dir():
-        shutil.rmtree(place / "undisturbed", ignore_errors=True)
-        (place / "undisturbed").mkdir()
-        project = copy_project(place / "undisturbed")
-        project.snakemake("--cores", "1")
-        shutil.copytree(project.results, place / "expected", symlinks=True)
-    expected = Results(place / "expected").digests()
+    undisturbed = Project(place / "undisturbed")
+    if not undisturbed.folder.is_dir():
+        (place / "making").mkdir(parents=True)
+        copy_project(place / "making").snakemake("--cores", "1")
+        (place / "making").rename(undisturbed.folder)
     shutil.rmtree(place / "disturbed", ignore_errors=True)
-    (place / "disturbed").mkdir()
-    project = copy_project(place / "disturbed")
-    run = DisturbedRun(project, expected, SEED, ("--cores", "1"))
+    shutil.copytree(undisturbed.folder, place / "disturbed", symlinks=True)
+    expected = Results(undisturbed.results).digests()
+    run = DisturbedRun(Project(place / "disturbed"), expected, SEED, ("--cores", "1"))
     run.kill(ALL)
     run.finish()
-    print(f"{dict(run.kills)}; complete {run.completed} times")
+    print(f"kills: {dict(run.kills)}; parts: {run.completed}; at work: {dict(run.stages)}")
