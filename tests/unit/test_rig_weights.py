@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.unit.exported import animated_head
 from vermilion.export.animation import NamedShapes
+from vermilion.export.head_pose import corrected_pose
 from vermilion.export.live_link import SHAPES, arkit_column, timecode, write_live_link
 from vermilion.export.objs import write_obj
 from vermilion.export.rig import bounded_weights, read_rig, solve_rig
@@ -66,6 +68,26 @@ def test_one_corrective_shows_what_the_rig_cannot():
     assert found.corrected_mm.mean() < 0.3
     assert found.corrective.min() >= 0.0
     assert found.corrective.max() == pytest.approx(1.0)
+
+
+def test_a_head_that_the_correction_moved_costs_no_weights():
+    """The corrected head stands elsewhere than the track's: its pose is found, and the rig's weights stay."""
+    true = smooth_weights()
+    animation, own, lips = shown(true)
+    shapes = replace(own, weights=true)
+    tilt = Rotation.from_euler("xyz", [4.0, -3.0, 1.0], degrees=True).as_matrix()
+    moved = replace(
+        animation, shapes=shapes,
+        vertices_mm=(animation.vertices_mm @ tilt.T + [3.0, -5.0, 12.0]).astype(np.float32),
+    )  # fmt: skip
+    still = ~lips
+    pose = corrected_pose(moved, still)
+    assert np.allclose(pose.rotation, tilt @ animation.head.rotation, atol=1e-5)
+    wanted = animation.head.translation_mm @ tilt.T + [3.0, -5.0, 12.0]
+    assert np.abs(pose.translation_mm - wanted).max() < 1e-3
+    found = solve_rig(replace(moved, head=pose), own, lips)
+    assert found.left_mm.mean() < 0.3
+    assert solve_rig(moved, own, lips).left_mm.mean() > 3.0
 
 
 def test_weights_minimise_the_energy_within_their_bounds():

@@ -6,7 +6,8 @@ and they change smoothly. Of all frames f with displacements d_f from the neutra
     sum_f |B w_f - d_f|^2 / n + SPARSE sum_f |w_f|_1 + SMOOTH sum_f |w_f - w_(f-1)|^2
 
 over weighted vertices (n: the sum of their weights), by coordinate descent over shapes, odd and even
-frames in turn.
+frames in turn. The corrective C with its weights c_f in [0, 1] is found in turn with them, d_f - c_f C in the
+place of d_f: it takes what no weights of the rig show, most of all the shape of this person's lips.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from vermilion.storage.errors import InputError
 
 SPARSE, SMOOTH = 2e-3, 2e-2  # mm^2 for a weight of 1
 _SWEEPS, _SETTLED = 400, 1e-5
+#: Rounds of weights and corrective in turn, until the lips come nearer by less than this share.
+_ROUNDS, _GAIN = 20, 0.001
 _LIPS = 6.0  # weight of a vertex of the lips against one of the face
 _NEUTRAL = "neutral"
 
@@ -32,14 +35,16 @@ class RigWeights:
 
     Attributes:
         frames: (F,) frame numbers with a mesh.
-        shapes: names, shapes (K, V, 3) mm and weights (F, K).
-        corrective_mm: (V, 3) the shape that explains most of what is left.
+        shapes: names, shapes (K, V, 3) mm and weights (F, K), which go with the corrective.
+        alone: (F, K) the best weights without a corrective.
+        corrective_mm: (V, 3) the shape that explains most of what the rig does not.
         corrective: (F,) its weights, in [0, 1].
-        left_mm: (F,) mean distance over the lips without the corrective; `corrected_mm` with it.
+        left_mm: (F,) mean distance over the lips of `alone`; `corrected_mm` with the corrective.
     """
 
     frames: np.ndarray
     shapes: NamedShapes
+    alone: np.ndarray
     corrective_mm: np.ndarray
     corrective: np.ndarray
     left_mm: np.ndarray
@@ -108,19 +113,36 @@ def solve_rig(animation: Animation, rig: NamedShapes, lips: np.ndarray) -> RigWe
     flat = scaled.reshape(len(shapes), -1)
     gram = flat @ shapes.reshape(len(shapes), -1).T
     target = moved.reshape(len(rows), -1) @ flat.T
-    weights = bounded_weights(gram, target)
-    rest = moved - np.tensordot(weights, shapes, axes=1)
-    corrective_mm, corrective = _one_shape(rest, trust)
-    after = rest[:, lips] - corrective[:, None, None] * corrective_mm[lips]
+    alone = weights = bounded_weights(gram, target)
+
+    def left(weights: np.ndarray) -> np.ndarray:
+        return moved - np.tensordot(weights, shapes, axes=1).astype(np.float32)
+
+    rest, off = left(weights), np.inf
+    left_mm = np.linalg.norm(rest[:, lips], axis=2).mean(axis=1)
+    for _ in range(_ROUNDS):
+        corrective_mm, corrective = _one_shape(rest, trust)
+        after = rest[:, lips] - corrective[:, None, None] * corrective_mm[lips]
+        corrected_mm = np.linalg.norm(after, axis=2).mean(axis=1)
+        if not corrected_mm.mean() < (1.0 - _GAIN) * off:
+            break
+        off, kept = corrected_mm.mean(), (weights, corrective_mm, corrective, corrected_mm)
+        shown = np.outer(corrective, flat @ corrective_mm.ravel())
+        weights = bounded_weights(gram, target - shown, start=weights)
+        rest = left(weights)
+    weights, corrective_mm, corrective, corrected_mm = kept
     return RigWeights(
-        animation.frames[rows], replace(rig, weights=weights), corrective_mm, corrective,
-        np.linalg.norm(rest[:, lips], axis=2).mean(axis=1),
-        np.linalg.norm(after, axis=2).mean(axis=1),
+        animation.frames[rows], replace(rig, weights=weights), alone, corrective_mm, corrective,
+        left_mm, corrected_mm,
     )  # fmt: skip
 
 
 def bounded_weights(
-    gram: np.ndarray, target: np.ndarray, sparse: float = SPARSE, smooth: float = SMOOTH
+    gram: np.ndarray,
+    target: np.ndarray,
+    sparse: float = SPARSE,
+    smooth: float = SMOOTH,
+    start: np.ndarray | None = None,
 ) -> np.ndarray:
     """Weights (F, K) in [0, 1] that minimise the energy of this module.
 
@@ -128,9 +150,10 @@ def bounded_weights(
         gram: (K, K) products of the shapes.
         target: (F, K) products of the shapes with each frame.
         sparse, smooth: mm^2 for a weight of 1.
+        start: (F, K) weights to begin with; None: zero.
     """
     count, n_shapes = target.shape
-    weights = np.zeros((count, n_shapes))
+    weights = np.zeros((count, n_shapes)) if start is None else start.copy()
     parities = [np.arange(start, count, 2) for start in (0, 1)]
     neighbours = np.full(count, 2.0)
     neighbours[[0, -1]] -= 1.0

@@ -13,6 +13,7 @@ from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.full_topology import FullFace, shapes_on_coarse
 from vermilion.export.head_binding import HeadBinding
 from vermilion.export.head_file import read_head
+from vermilion.export.head_pose import corrected_pose
 from vermilion.export.head_transfer import HeadTransfer
 from vermilion.export.live_link import write_live_link
 from vermilion.export.objs import write_obj
@@ -57,10 +58,11 @@ def coarse_animation(corrected, face, fit, identity, fps, unit_mm):
         shapes = NamedShapes((), np.zeros((0, face.n_vertices, 3)), np.zeros((len(fit.frames), 0)))
         rows = [row for row in range(len(corrected)) if np.isfinite(corrected[row]).all()]
         neutral = np.mean([head.to_head(row, np.float64(corrected[row])) for row in rows], axis=0)
-    return Animation(
+    animation = Animation(
         fit.frames, fps, corrected, Polygons.of_triangles(face.triangles), neutral, head, shapes,
         unit_mm, face.uv, fit.camera,
     )  # fmt: skip
+    return replace(animation, head=corrected_pose(animation, face.regions["rigid"]))
 
 
 def on_other_mesh(out, animation, other, name):
@@ -127,9 +129,7 @@ def write_rigs(snakemake, options, coarse, animation, face, other):
         found = solve_rig(coarse, shapes, lips_of(face))
         print(f"ARKit: {found.left_mm.mean():.3f} mm off over the lips")
         rotation = coarse.head.rotation[coarse.rows]
-        write_live_link(
-            out.live_link, found.frames, fps, shapes.names, found.shapes.weights, rotation
-        )
+        write_live_link(out.live_link, found.frames, fps, shapes.names, found.alone, rotation)
     if options.rig:
         rig = read_rig(inputs.rig, len(animation.neutral_mm))
         if inputs.get("head"):  # the rig stands in the unit and frame of the head's file
