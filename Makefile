@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify test test-quick test-latest test-faults test-kills test-interchange lint format docs reference clean
+.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify clean-intermediate test test-quick test-latest test-faults test-kills test-interchange lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -20,6 +20,7 @@ help:
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
 	@echo "make plates      frontal images of CONFIG without tattoo, with their camera, for your tracker"
 	@echo "make verify      find and remove damaged results of CONFIG"
+	@echo "make clean-intermediate  remove results of CONFIG that only the next stages read, and say how much that is"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
 	@echo "make test-latest the quick tests with the newest versions of all packages"
 	@echo "make test-slurm  the tiny capture on a real Slurm of two nodes (as root)"
@@ -72,6 +73,9 @@ report: $(READY)
 
 verify: $(READY)
 	@$(VERMILION) verify "$(CONFIG)"
+
+clean-intermediate: $(READY)
+	@$(VERMILION) clean-intermediate "$(CONFIG)"
 
 # Compiled test files are kept, also where the environment says not to: half of a process's start.
 PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder

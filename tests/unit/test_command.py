@@ -19,7 +19,8 @@ def test_every_subcommand_has_a_line_and_a_help(capsys):
     for name, line in found.items():
         assert line.endswith("."), name
         with pytest.raises(SystemExit) as ended:
-            parser_of(f"vermilion.app.commands.{name}", f"vermilion {name}").parse_args(["--help"])
+            module = f"vermilion.app.commands.{name.replace('-', '_')}"
+            parser_of(module, f"vermilion {name}").parse_args(["--help"])
         assert ended.value.code == 0 and f"vermilion {name}" in capsys.readouterr().out
 
 

@@ -142,9 +142,15 @@ def chunks(take):
     return [f"{a:06d}-{min(a + size - 1, row.last):06d}" for a in starts]
 
 
+def ends_of(chunk):
+    """First and last frame number of a chunk."""
+    first, last = chunk.split("-")
+    return int(first), int(last)
+
+
 def frames_in(chunk):
     """Frame numbers of a chunk."""
-    first, last = (int(number) for number in chunk.split("-"))
+    first, last = ends_of(chunk)
     return list(range(first, last + 1))
 
 
@@ -178,11 +184,11 @@ def first_chunk(pattern):
 
 def near_chunks(wildcards, reach):
     """Chunks of the wildcards' take with a frame at most `reach` frames from the wildcards' chunk."""
-    frames = frames_in(wildcards.chunk)
+    first, last = ends_of(wildcards.chunk)
     return [
         chunk
         for chunk in chunks(wildcards)
-        if frames_in(chunk)[0] <= frames[-1] + reach and frames_in(chunk)[-1] >= frames[0] - reach
+        if ends_of(chunk)[0] <= last + reach and ends_of(chunk)[1] >= first - reach
     ]
 
 

@@ -213,6 +213,9 @@ class P:
     quality = R + "/quality.tsv"
     summary = _EVALUATION + "/summary.html"
 
+    #: What `make clean-intermediate` removes: large, read by the next stages only, and no page or export shows it.
+    intermediate = (inpainted, maps, faces, anchor, clip, image_fit, apply_clip, guided_clip)
+
     @staticmethod
     def log(rule, job):
         """Log of a job: `job` says what it is done for ("run", "subject", "take", "chunk", ...)."""

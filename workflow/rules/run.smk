@@ -4,8 +4,11 @@ import socket
 import time
 
 from snakemake.exceptions import LockException
+from snakemake.output_index import OutputIndex
 
+from vermilion.app.quick_lookup import remember_producers
 from vermilion.provenance import checksums
+from vermilion.provenance.cleaning import forget_remade
 from vermilion.provenance.cut_folders import cut_folders
 from vermilion.provenance.file_times import mend_future_times
 from vermilion.provenance.run_lock import hold
@@ -99,12 +102,15 @@ def record_checksums():
     except VermilionError as error:
         print(error, file=sys.stderr)
         return
+    forget_remade(Path(R))
     for damage in refused:
         print(f"not to be trusted: {damage.path}: {damage.reason}", file=sys.stderr)
 
 
 #: Filled when the first job of this run starts.
 JOBS_STARTED = []
+
+remember_producers(OutputIndex)
 
 if IS_MAIN_PROCESS:
     workflow.execute = alone(workflow.execute)

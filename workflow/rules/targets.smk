@@ -4,6 +4,8 @@ Snakemake does not miss an intermediate file as long as what follows from it exi
 therefore wanted through its first output; `verify` removes all outputs of a job together.
 """
 
+from vermilion.provenance.cleaning import cleaned
+
 #: Roles -> outputs of a take: those with {chunk} are wanted for every chunk.
 TAKE_OUTPUTS = {
     ("tattoo", "plain", "video"): (P.manifest, P.cameras),
@@ -77,6 +79,12 @@ def study_outputs():
 
 
 def all_outputs():
+    """All that a finished run has, without intermediate results that were removed on purpose."""
+    gone = {str(path) for path in cleaned(Path(R))}
+    return [path for path in every_output() if path not in gone]
+
+
+def every_output():
     """All that a finished run has."""
     landmark_model = [P.landmark_model] if DETECTOR == "trained" else []
     return [

@@ -14,7 +14,8 @@ _FIRST = ("lips", "demo", "run", "sketch", "report", "verify", "generic", "docto
 
 def commands() -> dict[str, str]:
     """Name of each subcommand -> the first line of its docstring."""
-    return subcommands(Path(__file__).parent / "commands", _FIRST)
+    found = subcommands(Path(__file__).parent / "commands", _FIRST)
+    return {name.replace("_", "-"): line for name, line in found.items()}
 
 
 def usage() -> str:
@@ -37,7 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name not in commands():
         print(f"no subcommand is called {name!r}\n\n{usage()}", file=sys.stderr)
         return 2
-    parser = parser_of(f"vermilion.app.commands.{name}", f"vermilion {name}")
+    module = name.replace("-", "_")
+    parser = parser_of(f"vermilion.app.commands.{module}", f"vermilion {name}")
     parsed, unknown = parser.parse_known_args(options)
     parsed.options = unknown
     if parsed.options and not parsed.passes_on:

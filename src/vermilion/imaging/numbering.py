@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from vermilion.storage.errors import InputError
+
+_NUMBER = re.compile(r"[0-9]+$")
 
 
 def numbered_files(folder: str | Path, suffixes: Sequence[str]) -> dict[int, Path]:
@@ -20,13 +23,17 @@ def numbered_files(folder: str | Path, suffixes: Sequence[str]) -> dict[int, Pat
         InputError: two sequences in the folder, or two files of one number; it names both.
     """
     sequences: dict[str, dict[int, Path]] = {}
-    for path in sorted(Path(folder).glob("*")):
-        if path.name.startswith(".") or path.suffix.lower() not in suffixes:
+    folder = Path(folder)
+    # Of names, not of paths: the workflow looks at each of a facility's images.
+    for name in sorted(os.listdir(folder)) if folder.is_dir() else ():
+        stem, suffix = os.path.splitext(name)
+        if name.startswith(".") or suffix.lower() not in suffixes:
             continue
-        number = re.search(r"[0-9]+$", path.stem)
+        number = _NUMBER.search(stem)
         if number is None:
             continue
-        files = sequences.setdefault(path.stem[: number.start()].casefold(), {})
+        path = folder / name
+        files = sequences.setdefault(stem[: number.start()].casefold(), {})
         frame = int(number.group())
         if frame in files:
             raise InputError(
