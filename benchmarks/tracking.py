@@ -36,7 +36,7 @@ from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.tables import read_table
 from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
-from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.image_fit.take import DenseLips, TakeStart
 from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import focal_px
 from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
@@ -154,7 +154,8 @@ def speed(run: FinishedRun, model: FaceModel, person: Identity, fps: float, coun
     fit, images = landmark_fit(run), run.images()
     options = TrackingConfig().model_dump(mode="json")
     settings = landmark_fit_settings(options["fit"], options["motion"])
-    start = TakeStart.of(model, person, fit, run.landmarks(), settings)
+    lips = DenseLips(**options["image_fit"]["lips"])
+    start = TakeStart.of(model, person, fit, run.landmarks(), settings, lips=lips)
     appearance = Appearance.load(run.folder / "tracking" / "appearance.npz")
     face = start.face(appearance.samples)
     photometric = FrameFitSettings(**options["image_fit"]["frame_fit"])

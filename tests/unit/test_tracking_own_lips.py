@@ -12,7 +12,8 @@ from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
 from vermilion.tracking.identity.landmark_identity import IdentityFit
 from vermilion.tracking.identity.lip_offset import OwnLips, lip_offset
 from vermilion.tracking.identity.sampling import tells_lips
-from vermilion.tracking.image_fit.take import near_lips
+from vermilion.tracking.image_fit.take import DenseLips
+from vermilion.tracking.landmark_fit.expression import LandmarkFitSettings
 from vermilion.tracking.result import Identity
 
 LOWER_MM = 3.0
@@ -69,10 +70,18 @@ def test_dense_landmarks_alone_tell_lips(tmp_path, landmark_set, expected):
     assert tells_lips([str(tmp_path / "landmarks.npz")]) is expected
 
 
-def test_samples_on_and_beside_the_lips_are_found(model):
-    """With own lips the image's samples there do not count: teeth would be taken for lips."""
+def test_samples_at_the_opening_are_not_compared_and_those_of_the_lips_are(model):
+    """Teeth would be taken for lips; without the lips' own colour their motion in depth is lost."""
     neutral = model.neutral_of(np.zeros(model.n_identities))
-    found = near_lips(model, neutral, neutral)
-    assert found[model.regions["vermilion_lower"]].all()
-    chin = neutral[:, 1] < neutral[model.landmarks[MOUTH], 1].min() - 8.0
-    assert not found[chin].any()
+    found = DenseLips(opening_mm=1.5, noise_share=0.25).hides(model, neutral, neutral)
+    assert found[model.inner_contour].all()
+    assert not found[model.outer_contour].any()
+    assert found[model.regions["vermilion_lower"]].mean() < 0.5
+
+
+def test_landmarks_of_the_mouth_alone_are_sharper():
+    settings = LandmarkFitSettings()
+    sharp = DenseLips(opening_mm=1.5, noise_share=0.25).sharpened(settings)
+    ratio = sharp.noise.per_landmark(IBUG66) / settings.noise.per_landmark(IBUG66)
+    assert np.allclose(ratio[MOUTH], 0.25)
+    assert np.allclose(np.delete(ratio, MOUTH), 1.0)

@@ -190,6 +190,7 @@ rule appearance:
         cfg=cfg_of(
             "tracking.fit",
             "tracking.motion",
+            "tracking.image_fit.lips",
             "tracking.image_fit.appearance",
             "tracking.image_fit.frame_fit",
         ),
@@ -221,6 +222,7 @@ rule image_fit:
         cfg=cfg_of(
             "tracking.fit",
             "tracking.motion",
+            "tracking.image_fit.lips",
             "tracking.image_fit.appearance",
             "tracking.image_fit.frame_fit",
         ),
@@ -252,7 +254,12 @@ if CONFIG.tracking.image_fit.enabled:
             mem_mb=growing(1000, for_each_frame=2),
             runtime=growing(60),
         params:
-            cfg=cfg_of("tracking.fit", "tracking.motion", "tracking.image_fit.join"),
+            cfg=cfg_of(
+                "tracking.fit",
+                "tracking.motion",
+                "tracking.image_fit.lips",
+                "tracking.image_fit.join",
+            ),
             code=code_of("tracking/image_fit_join"),
             fps=take_fps,
         script:
@@ -279,7 +286,11 @@ rule offsets:
         runtime=growing(60),
     params:
         cfg=cfg_of(
-            "tracking.fit", "tracking.motion", "tracking.image_fit.appearance", "tracking.offsets"
+            "tracking.fit",
+            "tracking.motion",
+            "tracking.image_fit.lips",
+            "tracking.image_fit.appearance",
+            "tracking.offsets",
         ),
         code=code_of("tracking/offsets"),
         source=chunk_source,
@@ -313,6 +324,7 @@ rule residuals:
         cfg=cfg_of(
             "tracking.fit",
             "tracking.motion",
+            "tracking.image_fit.lips",
             "tracking.image_fit.appearance",
             "tracking.image_fit.overlay_frames",
         ),

@@ -94,6 +94,24 @@ class FrameFitConfig(ColourTermConfig):
     )
 
 
+class DenseLipsConfig(StageConfig):
+    """The mouth in the image fit, where dense landmarks tell the person's lips (`identity.own_lips`)."""
+
+    opening_mm: float = Field(
+        1.5,
+        ge=0,
+        le=20,
+        description="Samples so near to the inner edge of the lips are not compared with the image: teeth, "
+        "tongue and shade would be taken for lips (mm).",
+    )
+    noise_share: float = Field(
+        0.25,
+        gt=0,
+        le=10,
+        description="Deviation of the mouth's landmarks, as a share of that in the landmark fit.",
+    )
+
+
 class SmoothingConfig(StageConfig):
     """Smoothing of the fitted frames of a take over time."""
 
@@ -129,6 +147,7 @@ class ImageFitConfig(StageConfig):
     )
     appearance: AppearanceConfig = section(AppearanceConfig, "Lighting and albedo.")
     frame_fit: FrameFitConfig = section(FrameFitConfig, "Pose and expression of one frame.")
+    lips: DenseLipsConfig = section(DenseLipsConfig, "The mouth, with dense landmarks.")
     join: SmoothingConfig = section(SmoothingConfig, "Smoothing over time.")
     overlay_frames: int = Field(
         4, ge=1, le=100, description="Frames of a chunk in its overlay image (count)."

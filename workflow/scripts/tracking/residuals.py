@@ -14,7 +14,7 @@ from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
 from vermilion.tracking.image_fit.overlay import residual_sheet
 from vermilion.tracking.image_fit.residual import photometric_residual, sample_errors
-from vermilion.tracking.image_fit.take import TakeStart
+from vermilion.tracking.image_fit.take import DenseLips, TakeStart
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import landmark_fit_settings
 
@@ -26,11 +26,11 @@ def main(snakemake):
     track, appearance = LandmarkTrack.load(inputs.landmarks), Appearance.load(inputs.appearance)
     own = Appearance.load_pieces(inputs.appearance)
     settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
-    steps, starts = params.steps, {}
+    lips, steps, starts = DenseLips(**cfg["tracking.image_fit.lips"]), params.steps, {}
     for step in steps:
         fit = TrackedTake.load(inputs.landmark_fit if step == "landmarks" else inputs.fit)
         rows = fit.index_of(params.frames)
-        starts[step] = TakeStart.of(tracker, person, fit, track, settings, rows)
+        starts[step] = TakeStart.of(tracker, person, fit, track, settings, rows, lips)
     face = starts["landmarks"].face(appearance.samples)
     moved = np.zeros((len(rows), tracker.n_vertices, 3))
     if "offsets" in steps:

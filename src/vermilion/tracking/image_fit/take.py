@@ -31,9 +31,6 @@ from vermilion.tracking.landmark_fit.turned import as_seen_turned, turned_frames
 from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import landmark_fit_settings
 
-#: Samples so near to the lips do not count where landmarks tell the lips.
-BESIDE_LIPS_MM = 6.0
-
 
 class StartFiles(Protocol):
     """Input files of the image fit."""
@@ -42,6 +39,32 @@ class StartFiles(Protocol):
     identity: str
     fit: str
     landmarks: str | Sequence[str]
+
+
+@dataclass(frozen=True)
+class DenseLips:
+    """What counts at the mouth where dense landmarks tell the person's lips.
+
+    Teeth, tongue and shade beside real lips are taken for lips by the comparison with the image, which then
+    draws the lower lip over them; landmarks that draw lips as people have them say it better.
+
+    Attributes:
+        opening_mm: samples so near to the lips' inner edge are not compared.
+        noise_share: of the deviation that the mouth's landmarks have in the landmark fit.
+    """
+
+    opening_mm: float
+    noise_share: float
+
+    def hides(self, model: FaceModel, neutral_mm: np.ndarray, samples_mm: np.ndarray) -> np.ndarray:
+        """(N,) bool: samples (N, 3) of a neutral (V, 3), mm, that are not compared."""
+        edge = neutral_mm[model.inner_contour]
+        return cKDTree(edge).query(samples_mm)[0] < self.opening_mm
+
+    def sharpened(self, settings: LandmarkFitSettings) -> LandmarkFitSettings:
+        """Settings of the landmark term."""
+        mouth = self.noise_share * settings.noise.mouth
+        return replace(settings, noise=replace(settings.noise, mouth=mouth))
 
 
 @dataclass(frozen=True)
@@ -56,6 +79,7 @@ class TakeStart:
         reference: (3, 3) rotation, the mean of the whole take.
         seen: landmarks of the F frames, without what turned heads hide.
         settings: of the landmark fit.
+        lips: what counts at the mouth of a person with own lips; None: all.
     """
 
     model: FaceModel
@@ -65,6 +89,7 @@ class TakeStart:
     reference: np.ndarray
     seen: Observations
     settings: LandmarkFitSettings
+    lips: DenseLips | None = None
 
     @classmethod
     def of(
@@ -75,6 +100,7 @@ class TakeStart:
         track: LandmarkTrack,
         settings: LandmarkFitSettings,
         rows: np.ndarray | None = None,
+        lips: DenseLips | None = None,
     ) -> TakeStart:
         """Some `rows` (n,) of a landmark fit (all by default); `track` has these frames' landmarks."""
         camera = fit.camera
@@ -87,7 +113,8 @@ class TakeStart:
         place = {int(frame): row for row, frame in enumerate(track.frames)}
         order = np.array([place[int(frame)] for frame in fit.frames[rows]], dtype=int)
         seen = Observations.of(track, camera)[order]
-        start = cls(model, identity, camera, x[rows], reference, seen, settings)
+        lips = lips if identity.has_own_lips(model) else None
+        start = cls(model, identity, camera, x[rows], reference, seen, settings, lips)
         turned = turned_frames(rotation[rows], translation[rows])
         visible = as_seen_turned(
             seen, model, lambda row: start.vertices(start.x[row]), turned, focal_px(camera)
@@ -105,7 +132,7 @@ class TakeStart:
 
         Args:
             inputs: paths `tracker`, `identity`, `fit` and `landmarks` (one, or one a chunk).
-            cfg: sections `tracking.fit` and `tracking.motion`.
+            cfg: sections `tracking.fit`, `tracking.motion` and `tracking.image_fit.lips`.
             frames: numbers of the frames.
 
         Returns:
@@ -116,7 +143,8 @@ class TakeStart:
         track = LandmarkTrack.load(inputs.landmarks)
         settings = landmark_fit_settings(cfg["tracking.fit"], cfg["tracking.motion"])
         model, identity = FaceModel.load(inputs.tracker), Identity.load(inputs.identity)
-        return fit, rows, cls.of(model, identity, fit, track, settings, rows)
+        lips = DenseLips(**cfg["tracking.image_fit.lips"])
+        return fit, rows, cls.of(model, identity, fit, track, settings, rows, lips)
 
     @property
     def weight_sigmas(self) -> np.ndarray:
@@ -166,26 +194,18 @@ class TakeStart:
         points = face.points(x[N_POSE:]) @ rotation.T + x[3:6]
         normals = face.normals(x[N_POSE:]) @ rotation.T
         trust = visible_trust(self.model, self.vertices(x), points, normals)
-        if self.identity.has_own_lips(self.model):
-            trust[near_lips(self.model, self.identity.neutral_mm, face.neutral_mm)] = 0.0
+        settings = self.settings
+        if self.lips is not None:
+            trust[self.lips.hides(self.model, self.identity.neutral_mm, face.neutral_mm)] = 0.0
+            settings = self.lips.sharpened(settings)
         return FrameView(
             image_pyramid(image, self.camera, points, pixel_mm, levels),
             focal,
             trust,
-            LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], self.settings),
+            LandmarkTerm.of(self.landmark_shape(), self.seen[[row]], focal, x[5], settings),
             x,
             self.reference,
         )
-
-
-def near_lips(model: FaceModel, neutral_mm: np.ndarray, samples_mm: np.ndarray) -> np.ndarray:
-    """(N,) bool: samples (N, 3) of a neutral (V, 3) on or beside its lips, mm.
-
-    Teeth, tongue and shade beside real lips are taken for lips by the comparison with the image, which then
-    draws the lower lip over them; landmarks that draw lips as people have them say it better.
-    """
-    lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
-    return cKDTree(neutral_mm[lips]).query(samples_mm)[0] < BESIDE_LIPS_MM
 
 
 def observe_samples(
