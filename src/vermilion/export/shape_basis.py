@@ -13,8 +13,10 @@ from scipy import sparse
 
 from vermilion.export.animation import Animation, NamedShapes
 
-_GROWTH = 1.3  # of the number of components between two tries
+_GROWTH = 1.15  # of the number of components between two tries
+_RMS = 0.4  # of a coordinate, as a share of the tolerance, at the first try
 _BLOCK = 2048  # coordinates that are summed at once
+_SAMPLED = 2500  # vertices, at least, by which frames are compared
 _STILL = 0.25  # share of the tolerance below which a vertex needs no corrective
 
 
@@ -90,9 +92,11 @@ def shape_basis(animation: Animation, tolerance_mm: float) -> ShapeBasis:
         for index in range(len(rows)):
             flat[index] = left(index)[moved].ravel()
         extra, extra_weights, found = _correctives(flat, tolerance_mm)
-        spread = np.zeros((len(extra), *neutral.shape), dtype=np.float32)
-        spread[:, moved] = extra.reshape(len(extra), -1, 3)
-        shapes = np.concatenate([shapes, spread])
+        del flat  # the largest array
+        together = np.zeros((len(shapes) + len(extra), *neutral.shape), dtype=np.float32)
+        together[: len(shapes)] = shapes
+        together[len(shapes) :, moved] = extra.reshape(len(extra), -1, 3)
+        shapes = together
         weights = np.concatenate([weights, extra_weights], axis=1)
         error = max(error, found)
     n_extra = len(shapes) - len(named.names)
@@ -105,27 +109,33 @@ def _correctives(flat: np.ndarray, tolerance_mm: float) -> tuple[np.ndarray, np.
     mean = flat.mean(axis=0, dtype=np.float64).astype(np.float32)
     flat -= mean
     gram = np.zeros((len(flat), len(flat)))
-    for start in range(0, flat.shape[1], _BLOCK):
-        block = flat[:, start : start + _BLOCK].astype(np.float64)
+    # Some vertices tell how frames are alike; what comes of it is measured at all.
+    step = 3 * max(1, flat.shape[1] // (3 * _SAMPLED))
+    told = np.flatnonzero(np.arange(flat.shape[1]) % step < 3)
+    for start in range(0, len(told), _BLOCK):
+        block = flat[:, told[start : start + _BLOCK]].astype(np.float64)
         gram += block @ block.T
+    gram *= flat.shape[1] / max(len(told), 1)
     values, vectors = np.linalg.eigh(gram)
     values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1]
     left = np.sqrt(np.maximum(values.sum() - np.cumsum(values), 0) / flat.size)
-    # Where the RMS is a tenth of the tolerance, the largest error is near it.
-    count = int(np.argmax(left <= 0.1 * tolerance_mm)) + 1 if values[0] > 0 else 0
+    # Where the RMS of a coordinate is so small, the largest error of a vertex is near the tolerance.
+    count = int(np.argmax(left <= _RMS * tolerance_mm)) + 1 if values[0] > 0 else 0
     while True:
         used = vectors[:, :count]
-        shapes = (used.T @ flat).astype(np.float32)
-        error = _largest(flat, used.astype(np.float32), shapes)
+        single = used.astype(np.float32)  # or the product would be made of a copy in double
+        table = np.empty((count + 1, flat.shape[1]), dtype=np.float32)
+        shapes = np.matmul(single.T, flat, out=table[1:])
+        error = _largest(flat, single, shapes)
         if error <= tolerance_mm or count >= len(flat):
             break
         count = min(len(flat), int(np.ceil(count * _GROWTH)))
     low, high = used.min(axis=0, initial=0.0), used.max(axis=0, initial=0.0)
     span = np.where(high > low, high - low, 1.0)
-    mean = mean + (low @ shapes.astype(np.float64)).astype(np.float32)
+    table[0] = mean + low.astype(np.float32) @ shapes
     weights = np.concatenate([np.ones((len(flat), 1)), (used - low) / span], axis=1)
-    scaled = (shapes * span[:, None]).astype(np.float32)
-    return np.concatenate([mean[None], scaled]), weights, error
+    shapes *= span[:, None].astype(np.float32)
+    return table, weights, error
 
 
 def _largest(flat: np.ndarray, used: np.ndarray, shapes: np.ndarray) -> float:
