@@ -8,7 +8,7 @@ LANDMARKS := $(VENV)-mediapipe.ready
 DOCS := $(VENV)-docs
 VERMILION = $(BIN)/python -m vermilion.app
 
-.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify clean-intermediate test test-quick test-latest test-faults test-kills test-interchange lint format docs reference clean
+.PHONY: help setup demo lips generic run cameras plates sketch doctor report verify clean-intermediate test test-quick test-latest test-faults test-kills test-interchange test-slurm test-cloud lint format docs reference clean
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
@@ -25,6 +25,7 @@ help:
 	@echo "make test-latest the quick tests with the newest versions of all packages"
 	@echo "make test-slurm  the tiny capture on a real Slurm of two nodes (as root)"
 	@echo "make test-kills  200 kills over the whole tiny run, 20 full disks (as root)"
+	@echo "make test-cloud  results in a bucket, and the jobs that Kubernetes is given"
 	@echo "make test-interchange  Blender and the validators of USD and glTF open what is exported"
 	@echo "make lint        style of Python and Snakemake files, docstrings of arrays, types"
 	@echo "make docs        build the documentation site (results/site); also regenerates the"
@@ -113,6 +114,14 @@ test-kills: setup
 test-slurm: setup
 	VERMILION_TEST_SLURM=$${VERMILION_TEST_SLURM:-1} $(BIN)/python -m pytest tests/slurm
 
+# A server of this machine that speaks S3, and one that takes jobs as Kubernetes does.
+test-cloud: setup .venv-cloud.ready
+	VERMILION_CLOUD=.venv-cloud $(BIN)/python -m pytest -p no:cacheprovider tests/cloud
+
+.venv-cloud.ready: requirements.cloud.lock tools/setup_cloud.sh | $(READY)
+	tools/setup_cloud.sh .venv-cloud $(BIN)/python
+	@touch $@
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -139,5 +148,5 @@ $(DOCS)/.ready: requirements.docs.lock
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV)-latest $(VENV)-mediapipe* $(VENV)-interchange* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
+	rm -rf $(VENV) $(VENV)-latest $(VENV)-mediapipe* $(VENV)-interchange* $(VENV)-cloud* $(DOCS) .snakemake .pytest_cache .ruff_cache src/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -84,7 +84,11 @@ rule generic:
 
 
 onstart:
+    refuse_stages_in_a_bucket()
     refuse_impossible_jobs()
+    cancel_orphaned_jobs()
+    prepare_slurm()
+    record_beginning()
     mend_clock()
     JOBS_STARTED.append(True)
 

@@ -6,6 +6,7 @@ Snakemake's job step takes every SLURM_* variable away; a configuration that is 
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import signal
@@ -14,9 +15,13 @@ import subprocess
 import time
 from pathlib import Path
 
+import psutil
+
 INSTALL = "apt-get install -y --no-install-recommends slurm-wlm munge"
 _MARK = "# written by Vermilion's tests"
 _FOLDER = Path("/etc/slurm")
+#: One cluster at a time: they would have the same ports.
+_LOCK = Path("/var/lock/vermilion-test-slurm")
 _CONFIGURATION = """{mark}
 ClusterName=vermilion
 SlurmctldHost={host}(127.0.0.1)
@@ -42,17 +47,18 @@ MinJobAge=600
 MaxJobCount=20000
 KillWait=5
 SlurmctldTimeout=60
-SlurmdTimeout=60
+SlurmdTimeout=20
 StateSaveLocation={run}/controller
 SlurmdSpoolDir={run}/%n
 SlurmctldPidFile={run}/slurmctld.pid
 SlurmdPidFile={run}/slurmd-%n.pid
 SlurmctldLogFile={run}/slurmctld.log
 SlurmdLogFile={run}/slurmd-%n.log
-NodeName=n1 NodeHostname={host} NodeAddr=127.0.0.1 Port=17001 CPUs=2 RealMemory=8000 State=UNKNOWN
-NodeName=n2 NodeHostname={host} NodeAddr=127.0.0.1 Port=17002 CPUs=2 RealMemory=8000 State=UNKNOWN
+NodeName=n1 NodeHostname={host} NodeAddr=127.0.0.1 Port=17001 CPUs={cores} RealMemory=8000 State=UNKNOWN
+NodeName=n2 NodeHostname={host} NodeAddr=127.0.0.1 Port=17002 CPUs={cores} RealMemory=8000 State=UNKNOWN
 PartitionName=main Nodes=n1,n2 Default=YES MaxTime=60 DefaultTime=10 State=UP
 PartitionName=short Nodes=n1 MaxTime=5 DefaultTime=2 State=UP
+PartitionName=closed Nodes=n1 MaxTime=60 State=UP
 """
 
 
@@ -72,14 +78,18 @@ def why_not() -> str | None:
 class Cluster:
     """The cluster while a `with` lasts; partitions `main` (60 minutes) and `short` (5 minutes)."""
 
-    def __init__(self, run: Path):
+    def __init__(self, run: Path, cores: int | None = None):
+        """A cluster that keeps its state in the folder `run`; `cores` a node, else half of the machine's."""
         self.run = run
+        self.cores = cores or max(1, (os.cpu_count() or 2) // 2)
 
     def __enter__(self) -> Cluster:
+        self._lock = open(_LOCK, "w")
+        fcntl.flock(self._lock, fcntl.LOCK_EX)
         host = socket.gethostname().partition(".")[0]
         for folder in (self.run / "controller", self.run / "n1", self.run / "n2", _FOLDER):
             folder.mkdir(parents=True, exist_ok=True)
-        text = _CONFIGURATION.format(mark=_MARK, host=host, run=self.run)
+        text = _CONFIGURATION.format(mark=_MARK, host=host, run=self.run, cores=self.cores)
         (_FOLDER / "slurm.conf").write_text(text, encoding="utf-8")
         # This plugin starts without touching a mount; neither jobs nor tasks use control groups here.
         (_FOLDER / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n", encoding="utf-8")
@@ -95,27 +105,70 @@ class Cluster:
             self._stop(self.run / f"{name}.pid")
         (_FOLDER / "slurm.conf").unlink(missing_ok=True)
         (_FOLDER / "cgroup.conf").unlink(missing_ok=True)
+        self._lock.close()
 
-    def stop_node(self, node: str) -> None:
-        """Drain a node and end its daemon."""
-        subprocess.run(
-            ["scontrol", "update", f"NodeName={node}", "State=DOWN", "Reason=test"], check=True
-        )
-        self._stop(self.run / f"slurmd-{node}.pid")
+    def crash_node(self, node: str) -> None:
+        """Drain a node, then end its daemon and all that its jobs run, as a power cut does."""
+        self._update(node, "DRAIN")
+        os.kill(int((self.run / f"slurmd-{node}.pid").read_text()), signal.SIGKILL)
+        numbers = self._squeue("-t", "R,CG", "-w", node)
+        for step in psutil.process_iter(["name", "cmdline"]):
+            words = " ".join(step.info["cmdline"] or [])
+            if any(f"[{number}." in words for number in numbers):
+                for process in [*step.children(recursive=True), step]:
+                    process.kill()
 
-    def restart_controller(self) -> None:
-        """End the controller and start it again with the state that it saved."""
+    def start_node(self, node: str) -> None:
+        """Start the daemon of a node that crashed, and let jobs on it again."""
+        subprocess.run(["slurmd", "-N", node], check=True)
+        self._update(node, "RESUME")
+        self._wait(lambda: self._states().count("idle") == 2, "two idle nodes", 120)
+
+    def clear(self) -> None:
+        """No job, and two nodes that take some, whatever a test left."""
+        if not self._states():
+            self.start_controller()
+        subprocess.run(["scancel", "--user", "root"], check=True)
+        self._wait(lambda: not self.jobs(), "empty queue", 120)
+        self._wait(lambda: self._states().count("idle") == 2, "two idle nodes", 60)
+
+    def stop_controller(self) -> None:
+        """End the controller; jobs go on."""
         self._stop(self.run / "slurmctld.pid")
+
+    def start_controller(self) -> None:
+        """Start the controller with the state that it saved."""
         subprocess.run(["slurmctld"], check=True)
         self._wait(lambda: bool(self._states()), "an answer of the controller")
 
-    @staticmethod
-    def jobs() -> list[str]:
+    @classmethod
+    def jobs(cls) -> list[str]:
         """Numbers of the jobs that are pending or running."""
+        return cls._squeue("-t", "PD,R,CF,CG")
+
+    @classmethod
+    def running(cls) -> list[str]:
+        """Numbers of the jobs that run."""
+        return cls._squeue("-t", "R")
+
+    @staticmethod
+    def _squeue(*options: str) -> list[str]:
         listing = subprocess.run(
-            ["squeue", "-h", "-t", "PD,R,CF,CG", "-o", "%i"], capture_output=True, text=True
+            ["squeue", "-h", "-o", "%i", *options], capture_output=True, text=True
         )
         return listing.stdout.split()
+
+    @staticmethod
+    def _update(node: str, state: str) -> None:
+        words = ["scontrol", "update", f"NodeName={node}", f"State={state}", "Reason=test"]
+        subprocess.run(words, check=True)
+
+    @staticmethod
+    def _state(node: str) -> str:
+        listing = subprocess.run(
+            ["sinfo", "-h", "-n", node, "-p", "main", "-o", "%T"], capture_output=True, text=True
+        )
+        return listing.stdout.strip()
 
     @staticmethod
     def _states() -> list[str]:

@@ -49,18 +49,30 @@ def test_a_partition_without_a_time_limit_allows_any():
     assert impossible_jobs([job(minutes=100000)], limits) == []
 
 
+def test_a_partition_that_refuses_jobs_is_named():
+    limits = {"main": PartitionLimits(60, 8000, 2, "drain")}
+    (found,) = impossible_jobs([job()], limits)
+    assert "rule apply: partition 'main' takes no jobs now: it is drain" in found
+
+
 def test_without_slurm_nothing_is_refused():
     assert impossible_jobs([job(partition="")], {}) == []
 
 
 def test_limits_are_those_of_the_largest_node(tmp_path, monkeypatch):
-    listing = "main|1:00:00|8000|2\\nmain|1:00:00|16000+|8\\nlong|2-00:30:00|8000|2\\nfree|infinite|8000|2"
+    rows = (
+        "main|1:00:00|8000|2|up",
+        "main|1:00:00|16000+|8|up",
+        "long|2-00:30:00|8000|2|inactive",
+        "free|infinite|8000|2|up",
+    )
+    listing = "\\n".join(rows)
     fake = tmp_path / "sinfo"
     fake.write_text(f"#!/bin/sh\nprintf '{listing}'\n")
     fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
     assert read_partitions() == {
         "main": PartitionLimits(60, 16000, 8),
-        "long": PartitionLimits(2 * 24 * 60 + 30, 8000, 2),
+        "long": PartitionLimits(2 * 24 * 60 + 30, 8000, 2, "inactive"),
         "free": PartitionLimits(None, 8000, 2),
     }

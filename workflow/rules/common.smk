@@ -20,7 +20,6 @@ for variable in (
     os.environ.setdefault(variable, "1")
 
 from snakemake.exceptions import WorkflowError
-from snakemake.settings.types import ExecMode
 
 from vermilion.config.external_base import sequences_of
 from vermilion.config.load import load_configuration, read_keys
@@ -43,7 +42,10 @@ if any(letter.isspace() for letter in sys.executable):
         "Start the workflow by `make run` or `vermilion run`, which go around it."
     )
 
-IS_MAIN_PROCESS = workflow.exec_mode == ExecMode.DEFAULT
+
+include: "beginning.smk"
+
+
 ORIGIN = ", ".join(str(path) for path in workflow.configfiles)
 
 try:
@@ -60,6 +62,7 @@ include: "paths.smk"
 include: "resources.smk"
 
 
+link_to_local_copies(R)
 _TAKES = {take.name: take for take in TAKES}
 #: Name of a take -> the row of another tracker's sequence that is its base; empty: our own tracker's is.
 EXTERNAL = sequences_of(TAKES)
@@ -104,8 +107,9 @@ def in_report(path, category, caption, subcategory=None, **labels):
 def code_of(script):
     """Fingerprint of `workflow/scripts/<script>.py` and of all that it imports from the library."""
     # Beside this file, also where another workflow takes this one in as a module.
-    path = Path(workflow.source_path(f"../scripts/{script}.py"))
-    return lambda wildcards: fingerprint(path)
+    path = SCRIPT_FILES[script] = Path(workflow.source_path(f"../scripts/{script}.py"))
+    known = BEGUN.code.get(script) if BEGUN else None
+    return lambda wildcards: known or fingerprint(path)
 
 
 def takes(role=None, subject=None):

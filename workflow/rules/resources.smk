@@ -1,6 +1,11 @@
 """What a job may use: memory and time that grow with its frames and with each attempt."""
 
+from vermilion.app.orphaned_jobs import cancel_jobs, jobs_of_run, name_for
 from vermilion.app.partition_limits import impossible_jobs, read_partitions, requests_of
+from vermilion.app.unanswered_checks import keep_unanswered
+
+#: With this begin the names or comments of all Slurm jobs that write into these results.
+SLURM_NAME = name_for(R)
 
 
 def growing(least, for_each_frame=0.0):
@@ -25,10 +30,44 @@ def frames_of_job(wildcards):
     return len(take_of(wildcards).frames)
 
 
+def on_slurm():
+    """Whether jobs go to Slurm, as is known when the run starts."""
+    return workflow.executor_plugin.name in ("slurm", "cluster-generic")
+
+
 def refuse_impossible_jobs():
     """Before anything is submitted to Slurm: a sentence for each rule whose jobs could never start."""
-    if workflow.executor_plugin.name not in ("slurm", "cluster-generic"):
+    if not on_slurm():
         return
     sentences = impossible_jobs(requests_of(workflow.dag.needrun_jobs()), read_partitions())
     if sentences:
         raise WorkflowError("Some jobs could never start on this cluster:", *sentences)
+
+
+def cancel_orphaned_jobs():
+    """Cancel the Slurm jobs of a run that was killed: they would write into the same results as this one.
+
+    This run holds Snakemake's lock, so no other one can be alive.
+    """
+    if not on_slurm():
+        return
+    orphans = jobs_of_run(SLURM_NAME)
+    if orphans:
+        print(
+            f"Cancelling {len(orphans)} Slurm job(s) of an earlier run that was killed: "
+            f"{', '.join(orphans)}",
+            file=sys.stderr,
+        )
+        cancel_jobs(orphans)
+
+
+def prepare_slurm():
+    """Give the jobs of this run their name, and keep those about which Slurm does not answer."""
+    if not on_slurm():
+        return
+    # The profile for plain sbatch puts this into each job's comment; the plugin gives jobs their run's name.
+    os.environ["VERMILION_SLURM_NAME"] = SLURM_NAME
+    executor = workflow.scheduler._executor
+    if hasattr(executor, "run_uuid"):
+        executor.run_uuid = f"{SLURM_NAME}_{executor.run_uuid}"
+        keep_unanswered(executor)

@@ -9,8 +9,11 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+#: States of a partition in which jobs wait at the most; in others they are refused.
+_ACCEPTING = ("up", "down")
 
 
 @dataclass(frozen=True)
@@ -21,11 +24,13 @@ class PartitionLimits:
         minutes: longest time limit; None: unlimited.
         mem_mb: memory of the largest node.
         cores: cores of the largest node.
+        state: as `sinfo` has it (`up`, `down`, `inactive`, `drain`).
     """
 
     minutes: int | None
     mem_mb: int
     cores: int
+    state: str = "up"
 
 
 @dataclass(frozen=True)
@@ -50,13 +55,18 @@ def read_partitions() -> dict[str, PartitionLimits]:
     if shutil.which("sinfo") is None:
         return {}
     listing = subprocess.run(
-        ["sinfo", "--noheader", "--format", "%R|%l|%m|%c"], capture_output=True, text=True
+        ["sinfo", "--noheader", "--format", "%R|%l|%m|%c|%a"], capture_output=True, text=True
     )
     limits: dict[str, PartitionLimits] = {}
     for line in listing.stdout.split():
-        name, time, memory, cores = line.split("|")
+        name, time, memory, cores, state = line.split("|")
         # Slurm marks nodes that differ with a plus: the number is the smallest of them.
-        found = PartitionLimits(_minutes(time), int(memory.rstrip("+")), int(cores.rstrip("+")))
+        found = PartitionLimits(
+            _minutes(time),
+            int(memory.rstrip("+")),
+            int(cores.rstrip("+")),
+            state,
+        )
         known = limits.get(name)
         limits[name] = found if known is None else _larger(known, found)
     return limits
@@ -71,11 +81,14 @@ def impossible_jobs(
     """
     worst: dict[tuple[str, str, str], int] = {}
     unknown: dict[str, str] = {}
+    closed: dict[str, str] = {}
     for job in requests if limits else ():
         allowed = limits.get(job.partition)
         if allowed is None:
             unknown[job.partition] = job.rule
             continue
+        if allowed.state not in _ACCEPTING:
+            closed[job.partition] = job.rule
         for what, asked, most in (
             ("runtime", job.minutes, allowed.minutes),
             ("mem_mb", job.mem_mb, allowed.mem_mb),
@@ -84,7 +97,13 @@ def impossible_jobs(
             if most is not None and asked > most:
                 key = (job.rule, what, job.partition)
                 worst[key] = max(worst.get(key, 0), asked)
-    return [_unknown_partition(name, rule, limits) for name, rule in sorted(unknown.items())] + [
+    names = [_unknown_partition(name, rule, limits) for name, rule in sorted(unknown.items())]
+    names += [
+        f"rule {rule}: partition '{name}' takes no jobs now: it is {limits[name].state}. Wait, or choose "
+        "another partition (--default-resources slurm_partition=NAME)."
+        for name, rule in sorted(closed.items())
+    ]
+    return names + [
         f"rule {rule} asks for {what} {asked}{_unit(what)}; partition '{partition}' allows "
         f"{_allowed(limits[partition], what)}{_unit(what)}. Choose another partition "
         f"(--default-resources slurm_partition=NAME) or ask for less "
@@ -119,7 +138,7 @@ def _minutes(text: str) -> int | None:
 
 
 def _larger(one: PartitionLimits, other: PartitionLimits) -> PartitionLimits:
-    return PartitionLimits(one.minutes, max(one.mem_mb, other.mem_mb), max(one.cores, other.cores))
+    return replace(one, mem_mb=max(one.mem_mb, other.mem_mb), cores=max(one.cores, other.cores))
 
 
 def _allowed(limits: PartitionLimits, what: str) -> int | None:

@@ -35,7 +35,7 @@ from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.undistortion import straight_camera
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import (
     StreamedSequence,
@@ -189,5 +189,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -6,8 +6,8 @@ from vermilion.export.head_overlay import head_overlay
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
+from vermilion.provenance.begun_run import begin_job
 from vermilion.scan.landmarks import ScanLandmarks, find_landmarks, read_landmarks, write_landmarks
-from vermilion.storage.logfile import log_to
 
 
 def landmarks_of(snakemake, generic, head, subject):
@@ -40,5 +40,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

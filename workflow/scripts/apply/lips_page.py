@@ -8,9 +8,9 @@ import numpy as np
 from vermilion.export.page_video import page_video
 from vermilion.faces.model import FaceModel
 from vermilion.features.rings import lip_rings
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report.lips_page import TakeFile, TakePage, take_page
 from vermilion.storage.files import write_text
-from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
 from vermilion.tracking.result import TrackedTake
@@ -64,5 +64,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

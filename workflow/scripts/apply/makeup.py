@@ -12,8 +12,8 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
 from vermilion.landmarks.scheme import EYE_LEFT
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence
 from vermilion.tracking.image_fit.overlay import samples_to_vertices
@@ -70,5 +70,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -3,8 +3,8 @@
 import shutil
 
 from vermilion.export.overlay import join_videos
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.files import atomic_path
-from vermilion.storage.logfile import log_to
 
 
 def main(snakemake):
@@ -14,5 +14,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -23,9 +23,9 @@ from vermilion.geometry.camera import write_cameras
 from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import read_image, write_srgb8
 from vermilion.imaging.source import folder_of
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import write_text
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 
 
@@ -124,5 +124,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -5,7 +5,7 @@ from vermilion.capture.overlay import contact_sheet
 from vermilion.capture.video_facts import load_video_facts
 from vermilion.imaging.frames import open_frames, read_or_none
 from vermilion.imaging.images import write_srgb8
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import write_quality
 
 
@@ -36,5 +36,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -1,7 +1,7 @@
 """Hash a video file and list its frames, once a take."""
 
 from vermilion.capture.video_facts import video_facts
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -9,5 +9,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -13,7 +13,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake
@@ -93,5 +93,5 @@ def main(snakemake) -> None:
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

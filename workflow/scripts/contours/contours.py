@@ -10,8 +10,8 @@ from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.files import atomic_folder
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence
@@ -62,5 +62,5 @@ def main(snakemake) -> None:
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -8,8 +8,8 @@ from vermilion.correction.take_layers import quality_rows, save_layers, take_lay
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_arrays
-from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import read_table
@@ -50,5 +50,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -10,9 +10,9 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.files import read_neutral
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.result import Identity, TrackedTake
 
 
@@ -62,5 +62,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -6,7 +6,7 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.database.gather import read_take_files
 from vermilion.database.schema import SubjectEntry
 from vermilion.database.write import write_database
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.progress import progress
 from vermilion.tracking.result import Identity
 
@@ -38,5 +38,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

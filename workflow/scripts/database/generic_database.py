@@ -12,9 +12,9 @@ from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import mesh_corners
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_array, read_arrays
 from vermilion.storage.chunks import read_chunks
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence
 from vermilion.tracking.result import Identity, TrackedTake
@@ -100,5 +100,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -10,8 +10,8 @@ from vermilion.detail.flow.six_frame_flow import FlowSettings
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, rows_of_frames, write_sequence
 from vermilion.storage.tables import write_table
@@ -77,5 +77,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

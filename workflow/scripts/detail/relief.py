@@ -8,7 +8,7 @@ from vermilion.detail.relief.relief import ReliefSettings
 from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -26,5 +26,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

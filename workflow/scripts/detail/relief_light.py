@@ -6,8 +6,8 @@ from vermilion.detail.relief.topology import FineTopology
 from vermilion.export.objs import write_obj
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.result import TrackedTake
 
 
@@ -45,5 +45,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -17,10 +17,10 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_channels, write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
@@ -96,5 +96,5 @@ def residuals(scene, light, reader, frame, smooth, mesh):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -30,11 +30,11 @@ from vermilion.evaluation.truth import read_curves, read_truth
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
+from vermilion.provenance.begun_run import begin_job
 from vermilion.regression.model import load_model
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.chunks import read_chunks, read_frames
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
@@ -260,5 +260,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

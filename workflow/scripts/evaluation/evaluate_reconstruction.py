@@ -20,8 +20,8 @@ from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.geometry.mesh import Mesh, vertex_normals
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import frames_of, read_sequence
 from vermilion.storage.tables import write_table
 
@@ -76,5 +76,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -7,11 +7,11 @@ from vermilion.config.regressors import in_order
 from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report import mesh_sheets
 from vermilion.report.figures import plot_curves
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table
 
 LIPS_MM = 110.0
@@ -84,5 +84,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

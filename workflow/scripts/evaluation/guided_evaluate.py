@@ -9,10 +9,10 @@ from vermilion.evaluation.statistics import Resampling, clips_of
 from vermilion.faces.model import FaceModel
 from vermilion.guided.regions import regions_of_face
 from vermilion.multiview.files import read_neutral
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report.guided_curve import draw_guided_curve
 from vermilion.report.guided_sheet import draw_guided_sheet
 from vermilion.storage.arrays import read_array
-from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
 
@@ -53,5 +53,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -7,9 +7,9 @@ import numpy as np
 from vermilion.baselines.lip_shapes import PosedTake, choose_lip_shapes
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.faces.model import FaceModel
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.chunks import read_frames
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.tables import read_table
 
@@ -46,5 +46,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

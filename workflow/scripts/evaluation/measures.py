@@ -8,11 +8,11 @@ from vermilion.evaluation.files import load_sums
 from vermilion.evaluation.kind_errors import kind_rows
 from vermilion.evaluation.measures import COLUMNS, seconds_rows
 from vermilion.evaluation.pooled import groups_of, pooled_rows
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report.feature_tables import estimators, table2, table3
 from vermilion.report.figures import plot_figure16, plot_table1
 from vermilion.report.headline import headline
 from vermilion.report.table1 import table1
-from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table, write_table
 
 
@@ -51,5 +51,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -9,9 +9,9 @@ from vermilion.external.weights_file import read_weights
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.json_files import load_json
-from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.tracking.result import Identity
 
@@ -53,5 +53,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

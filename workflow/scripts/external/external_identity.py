@@ -4,9 +4,9 @@ import numpy as np
 
 from vermilion.external.motion import neutral_in_head
 from vermilion.faces.model import FaceModel
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.result import Identity
 
 
@@ -40,5 +40,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -8,7 +8,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, write_sequence
 from vermilion.storage.tables import read_table
@@ -54,5 +54,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

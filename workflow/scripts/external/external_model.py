@@ -7,8 +7,8 @@ from vermilion.external.motion import displacements_of, neutral_in_head
 from vermilion.external.shape_modes import with_blend_shapes, with_modes
 from vermilion.external.weights_file import read_weights
 from vermilion.faces.model import FaceModel
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.chunks import read_frames
-from vermilion.storage.logfile import log_to
 
 
 def training_frames(model, take, paths, neutral_path):
@@ -57,5 +57,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -7,10 +7,10 @@ from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
+from vermilion.provenance.begun_run import begin_job
 from vermilion.scan.landmarks import find_landmarks, read_landmarks, write_landmarks
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 
 
 def neutral_of(inputs, frame, place):
@@ -51,5 +51,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

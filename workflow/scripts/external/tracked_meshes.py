@@ -2,7 +2,7 @@
 
 from vermilion.external.origin import Origin
 from vermilion.external.read import read_tracked
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
 
@@ -38,5 +38,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,8 +4,8 @@ from vermilion.external.origin import Origin
 from vermilion.external.read import read_tracked
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 
 
 def first_mesh(source, frames, **options):
@@ -39,5 +39,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -3,10 +3,10 @@
 from dataclasses import fields
 
 from vermilion.faces.build import FaceModelSettings, build_models
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     cfg = snakemake.params.cfg["face_model"]
     source = snakemake.input.get("source")
     settings = FaceModelSettings(**{key.name: cfg[key.name] for key in fields(FaceModelSettings)})

@@ -11,8 +11,8 @@ from vermilion.imaging.draw import to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.chunks import read_frames
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
@@ -97,5 +97,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -19,9 +19,9 @@ from vermilion.guided.silhouette import LipSurface
 from vermilion.imaging.draw import tile, to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.tracking.result import TrackedTake
 
@@ -103,5 +103,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -8,7 +8,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.guided.regions import regions_of_face
 from vermilion.guided.suggestion import mouth_deformation, suggest_frames, unexplained_share
 from vermilion.multiview.files import read_neutral
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
 from vermilion.tracking.result import Identity, TrackedTake
@@ -45,5 +45,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

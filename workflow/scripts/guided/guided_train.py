@@ -8,7 +8,7 @@ from vermilion.guided.propagation import LipPropagator
 from vermilion.guided.refined_frame import RefinedFrame, stacked
 from vermilion.guided.regions import regions_of_face
 from vermilion.multiview.files import read_neutral
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.tracking.result import Identity
 
 
@@ -42,5 +42,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

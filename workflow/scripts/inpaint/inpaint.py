@@ -15,10 +15,10 @@ from vermilion.inpaint.grain import noise_seed
 from vermilion.inpaint.opening import OpeningSettings
 from vermilion.inpaint.overlay import before_after, contact_sheet
 from vermilion.inpaint.shading import ShadingSettings
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import read_sequence
@@ -82,5 +82,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -11,7 +11,7 @@ from vermilion.inpaint.overlay import texture_sheet
 from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
 from vermilion.inpaint.views import read_views
 from vermilion.multiview.files import read_neutral
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -35,5 +35,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -10,7 +10,7 @@ from vermilion.inpaint.files import write_texture
 from vermilion.inpaint.overlay import texture_sheet
 from vermilion.inpaint.views import read_views
 from vermilion.multiview.files import read_neutral
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -31,5 +31,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -6,7 +6,7 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detect import draw_landmarks
 from vermilion.landmarks.labels import read_labels
 from vermilion.landmarks.training import TrainingSettings, labelled_images, train_descent
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -24,5 +24,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

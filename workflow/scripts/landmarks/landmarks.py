@@ -5,7 +5,7 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detect import followed_track, landmark_overlay
 from vermilion.landmarks.faces import FaceFinds
 from vermilion.landmarks.following import FollowedFace
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import write_quality
 
 
@@ -21,5 +21,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

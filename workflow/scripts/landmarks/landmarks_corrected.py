@@ -7,7 +7,7 @@ from vermilion.landmarks.correction_overlay import correction_overlay
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import KeyFrames
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import write_quality
 
 
@@ -30,5 +30,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,7 +4,7 @@ from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.choose import open_detector
 from vermilion.landmarks.faces import find_faces
 from vermilion.landmarks.table import GivenLandmarks
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -34,5 +34,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -2,7 +2,7 @@
 
 from vermilion.landmarks.faces import SeenFaces
 from vermilion.landmarks.following import FaceChoice, follow
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.tables import write_table
 
 
@@ -17,5 +17,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -8,7 +8,7 @@ from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
 from vermilion.landmarks.labels import labels_by_frame
 from vermilion.landmarks.table import GivenLandmarks
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.tables import write_table
 
 
@@ -45,5 +45,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

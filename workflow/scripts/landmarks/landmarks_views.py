@@ -11,8 +11,8 @@ from vermilion.landmarks.detect import draw_landmarks
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.table import GivenLandmarks
 from vermilion.landmarks.views import LandmarkViews
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 
 
 def main(snakemake):
@@ -43,5 +43,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

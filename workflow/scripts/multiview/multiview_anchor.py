@@ -7,7 +7,7 @@ from vermilion.multiview.anchors import TrackSettings, find_anchor
 from vermilion.multiview.files import read_neutral, write_anchor
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.take import MultiviewImages, open_coarse
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -29,5 +29,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -9,7 +9,7 @@ from vermilion.multiview.files import read_anchor, read_neutral, write_clip
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.take import MultiviewImages, open_coarse
 from vermilion.multiview.track import Clip, track_clip
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -42,5 +42,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

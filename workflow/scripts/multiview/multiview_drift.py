@@ -7,8 +7,8 @@ from vermilion.multiview.drift import DriftSettings, Origin, carry, drift_rows, 
 from vermilion.multiview.files import read_neutral
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.take import MultiviewImages
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
@@ -38,5 +38,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

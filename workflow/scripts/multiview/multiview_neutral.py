@@ -16,7 +16,7 @@ from vermilion.multiview.register_to_first_take import register_to_first_take
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
 from vermilion.multiview.triangulate import triangulate_landmarks
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def refiner_of_first_take(snakemake, stereo, model):
@@ -80,5 +80,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -11,9 +11,9 @@ from vermilion.multiview.overlay import frames_sheet
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import write_array
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import write_sequence
@@ -53,5 +53,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -9,12 +9,12 @@ from vermilion.multiview.files import read_anchors, read_neutral
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, RefineSettings
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report.multiview_page import TakeFindings, choose_frames, join_frames, report_page
 from vermilion.report.multiview_sheets import SheetSettings
 from vermilion.report.multiview_take_sheets import TakeSheets
 from vermilion.storage.arrays import read_array
 from vermilion.storage.files import write_text
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.storage.tables import read_table, write_table
@@ -79,5 +79,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

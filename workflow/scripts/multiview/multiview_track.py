@@ -7,7 +7,7 @@ from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.multiview.files import read_anchor, read_clip, read_neutral, write_track
 from vermilion.multiview.track import join_clips
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
@@ -22,5 +22,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.quality import COLUMNS, flagged_frames
 from vermilion.storage.tables import write_table
 
@@ -17,5 +17,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from vermilion.provenance.begun_run import begin_job
 from vermilion.report.summary import (
     FRAME_COLUMNS,
     REGRESSOR_COLUMNS,
@@ -13,7 +14,6 @@ from vermilion.report.summary import (
     summary_page,
 )
 from vermilion.storage.files import atomic_path
-from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import read_table
 
 
@@ -72,5 +72,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,11 +4,11 @@ from vermilion.config.tracking import ScanConfig
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
+from vermilion.provenance.begun_run import begin_job
 from vermilion.scan.landmarks import find_landmarks, read_landmarks, write_landmarks
 from vermilion.scan.overlay import scan_overlay
 from vermilion.scan.personal import personal_model
 from vermilion.scan.read import read_scan
-from vermilion.storage.logfile import log_to
 from vermilion.storage.quality import write_quality
 
 
@@ -42,5 +42,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,14 +4,14 @@ from pathlib import Path
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import write_cameras
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.studio.capture_writer import write_labels, write_truth
 from vermilion.studio.rig import RigSettings
 from vermilion.studio.take import cameras_of, plan_take
 from vermilion.studio.take_settings import take_settings
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     cameras = cameras_of(plan, cfg["plan"]["role"], RigSettings(**cfg["cameras"]))

@@ -4,13 +4,13 @@ from pathlib import Path
 
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.studio.capture_writer import write_images
 from vermilion.studio.take import plan_take
 from vermilion.studio.take_settings import take_settings
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     cfg = snakemake.params.cfg
     plan = plan_take(FaceModel.load(snakemake.input.model), take_settings(cfg["plan"]))
     write_images(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.tables import read_table, write_table
 from vermilion.tracking.image_fit.ablations import ablation_rows
 
@@ -21,5 +21,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

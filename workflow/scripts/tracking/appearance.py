@@ -5,8 +5,8 @@ import numpy as np
 from vermilion.appearance.samples import sample_skin
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.image_fit.appearance_frames import choose_appearance_frames
 from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 from vermilion.tracking.image_fit.overlay import appearance_image
@@ -75,5 +75,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

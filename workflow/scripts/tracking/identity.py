@@ -1,7 +1,7 @@
 """The identity of a subject from landmarks of sampled frames of its takes."""
 
 from vermilion.faces.model import FaceModel
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.tracking.identity.landmark_identity import fit_identity
 from vermilion.tracking.identity.sampling import sample_takes, tells_lips
 from vermilion.tracking.result import Identity
@@ -22,5 +22,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,8 +4,8 @@ import numpy as np
 
 from vermilion.appearance.estimate import Appearance
 from vermilion.imaging.frames import open_frames
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import write_arrays
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.image_fit.chunk import FrameChunk, fit_frames
 from vermilion.tracking.image_fit.frame_fit import FrameFitSettings, FrameProblem
 
@@ -25,5 +25,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

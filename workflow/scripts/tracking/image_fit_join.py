@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from vermilion.capture.video_facts import uneven_times
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.chunks import read_chunks
-from vermilion.storage.logfile import log_to
 from vermilion.tracking.image_fit.smooth_over_time import smooth_over_time
 from vermilion.tracking.image_fit.take import TakeStart
 from vermilion.tracking.landmark_fit.expression import N_POSE
@@ -32,5 +32,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -6,8 +6,8 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.draw import tile
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.logfile import log_to
 from vermilion.storage.progress import progress
 from vermilion.tracking.identity.colour_residuals import IdentityImageSettings
 from vermilion.tracking.identity.joint_identity import fit_joint_identity
@@ -66,5 +66,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vermilion.imaging.frames import open_frames
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.image_fit.chunk import FrameChunk
 from vermilion.tracking.offsets import OffsetSettings, OffsetSolver
@@ -26,5 +26,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -7,9 +7,9 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
+from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
-from vermilion.storage.logfile import log_to
 from vermilion.storage.sequences import read_sequence
 from vermilion.storage.tables import write_table
 from vermilion.tracking.image_fit.overlay import residual_sheet
@@ -68,5 +68,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -4,7 +4,7 @@ from vermilion.capture.video_facts import uneven_times
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.tracking.landmark_fit.expression import fit_motion
 from vermilion.tracking.landmark_fit.observation import Observations, focal_px, with_focal
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
@@ -46,5 +46,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

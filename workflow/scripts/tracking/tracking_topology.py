@@ -3,7 +3,7 @@
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
-from vermilion.storage.logfile import log_to
+from vermilion.provenance.begun_run import begin_job
 from vermilion.tracking.result import Identity
 
 
@@ -14,5 +14,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -3,10 +3,10 @@
 from vermilion.config.regressors import GENERIC, trained_on
 from vermilion.config.training import TrainingConfig
 from vermilion.database.read import LipDatabase
+from vermilion.provenance.begun_run import begin_job
 from vermilion.regression.model import save_model
 from vermilion.regression.training import Selection, curve_table, train
 from vermilion.report.cross_validation import plot_curve
-from vermilion.storage.logfile import log_to
 from vermilion.storage.tables import write_table
 
 
@@ -28,5 +28,5 @@ def main(snakemake):
 
 
 if __name__ == "__main__":
-    log_to(snakemake.log[0])
+    begin_job(snakemake.log[0], __file__, snakemake.params.code)
     main(snakemake)

@@ -1,0 +1,59 @@
+"""The cluster that the tests of this folder share, and projects to run on it."""
+
+import os
+import shutil
+
+import pytest
+
+from tests.slurm.cluster import Cluster, why_not
+from tests.slurm.runs import HELD, RIG_SCRIPT, RIGS, ROOT, Copy, files_of
+
+WANTED = os.environ.get("VERMILION_TEST_SLURM", "")
+
+
+def pytest_collection_modifyitems(items):
+    here = [item for item in items if ROOT / "tests" / "slurm" in item.path.parents]
+    for item in here:
+        item.add_marker(pytest.mark.slow)
+        if not WANTED:
+            item.add_marker(pytest.mark.skip(reason="make test-slurm starts a real Slurm"))
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory):
+    """A Slurm of two nodes, without accounting."""
+    reason = why_not()
+    if reason:
+        pytest.fail(reason)
+    with Cluster(tmp_path_factory.mktemp("slurm")) as running:
+        yield running
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A copy of the project in which nothing has run."""
+    return Copy.of(ROOT, tmp_path / "project")
+
+
+@pytest.fixture(scope="session")
+def with_rigs(tmp_path_factory):
+    """A copy in which the rigs were made without a cluster; their script can be held."""
+    made = Copy.of(ROOT, tmp_path_factory.mktemp("rigs") / "project")
+    first = "begin_job(snakemake.log[0], __file__, snakemake.params.code)"
+    made.edit(RIG_SCRIPT, first, first + HELD)
+    run = made.run(*RIGS, "--cores", "2")
+    assert run.returncode == 0, run.stdout[-3000:]
+    return made
+
+
+@pytest.fixture
+def rigs(with_rigs, cluster, tmp_path):
+    """A copy in which only the rigs are missing, and the files that they must become."""
+    project = Copy.of(with_rigs.folder, tmp_path / "project")
+    expected = files_of(project.results)
+    for name in ("captures", "truth"):
+        shutil.rmtree(project.results / name)
+    (project.folder / "started.txt").unlink()
+    yield project, expected
+    project.stop()
+    cluster.clear()
