@@ -85,6 +85,7 @@ class Copy:
                 stdout=stream,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=_let_be_interrupted,
             )
         self.runs.append(run)
         return run
@@ -117,6 +118,11 @@ class Copy:
         text = (self.folder / path).read_text()
         assert text.count(old) == 1, f"{path}: {old}"
         (self.folder / path).write_text(text.replace(old, new))
+
+
+def _let_be_interrupted() -> None:
+    """A process that was started in the background ignores Ctrl-C, and so do those that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def on(profile: str) -> list[str]:
