@@ -30,6 +30,21 @@ def test_the_container_keeps_environments_and_results_out():
     assert {".venv*", "results", ".git"} <= set(ignored)
 
 
+def test_the_container_is_built_from_what_is_locked_and_runs_without_root():
+    text = (PROJECT / "Containerfile").read_text(encoding="utf-8")
+    steps = re.sub(r"\\\n\s*", " ", re.sub(r"^#.*\n", "", text, flags=re.M)).splitlines()
+    known = {"FROM", "COPY", "WORKDIR", "RUN", "ENV", "USER", "ENTRYPOINT", "CMD"}
+    assert {step.split()[0] for step in steps if step.strip()} <= known
+    images = [step.split()[1] for step in steps if step.startswith("FROM")]
+    assert images and all(re.search(r":\d", image) for image in images)
+    installs = [step for step in steps if "pip install" in step]
+    assert installs and all("--require-hashes" in step or "--no-deps" in step for step in installs)
+    packages = [step for step in steps if "apt-get install" in step]
+    assert all("--no-install-recommends" in step and "rm -rf" in step for step in packages)
+    users = [step for step in steps if step.startswith("USER")]
+    assert users and users[-1].split()[1] not in ("0", "root")
+
+
 def test_every_page_of_the_site_is_in_its_navigation():
     # `make docs` is strict, too, but needs its environment.
     text = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
