@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> None:
         idle_wall_s, idle_s = spent(folder, "--until", "studio_rig_p_video")
         workflow_wall_s, workflow_s = spent(folder)
         loop_wall_s, loop_s = spent_in_a_loop(folder, arguments.frames, arguments.chunks)
-    job_s = (workflow_s - loop_s) / arguments.chunks
+    job_s = (workflow_s - idle_s - loop_s) / arguments.chunks
     rows = [
         {"way": "workflow", "wall_s": workflow_wall_s, "core_s": workflow_s},
         {"way": "loop", "wall_s": loop_wall_s, "core_s": loop_s},
@@ -58,14 +58,11 @@ def run(arguments: argparse.Namespace) -> None:
     ]
     print_table(rows)
     print(
-        f"{arguments.chunks} chunks of {arguments.frames} frames: the workflow costs "
-        f"{workflow_s / loop_s - 1:.1%} more core seconds than the loop, "
-        f"{workflow_wall_s / loop_wall_s - 1:.1%} more time; {job_s:.2f} core s a job, planning included"
+        f"{arguments.chunks} chunks of {arguments.frames} frames: a job costs {job_s:.2f} core s beside its work, "
+        f"{job_s * arguments.chunks / loop_s:.1%} of it; planning and records cost {idle_s:.1f} core s, once a run"
     )
     if arguments.results:
-        print_table(
-            share_of_rules(arguments.results, (workflow_s - idle_s - loop_s) / arguments.chunks), 3
-        )
+        print_table(share_of_rules(arguments.results, job_s), 3)
 
 
 def make_project(folder: Path, frames: int, chunks: int) -> None:
@@ -177,6 +174,10 @@ def share_of_rules(results: Path, job_s: float) -> pd.DataFrame:
         frames = sum(int(last) - int(first) + 1 for first, last in spans)
         table = pd.concat([pd.read_csv(path, sep="\t") for path in files])
         frame_s = max(table["cpu_time"].sum() / frames, 1e-9)
-        share = job_s / (100 * frame_s)
-        rows.append({"rule": folder.name, "frames": frames, "frame_s": frame_s, "job_share": share})
-    return pd.DataFrame(rows).sort_values("frame_s", ascending=False)
+        rows.append({"rule": folder.name, "frames": frames, "frame_s": frame_s, "jobs": 1})
+    rows.sort(key=lambda row: -row["frame_s"])
+    total = sum(row["frame_s"] for row in rows)
+    most = max(row["frames"] for row in rows)
+    rows.append({"rule": "all of these", "frames": most, "frame_s": total, "jobs": len(rows)})
+    shares = [{"job_share": row["jobs"] * job_s / (100 * row["frame_s"])} for row in rows]
+    return pd.DataFrame([row | share for row, share in zip(rows, shares, strict=True)])
