@@ -47,7 +47,7 @@ demo: setup
 	@$(VERMILION) demo
 
 generic: setup
-	@$(VERMILION) generic
+	@$(VERMILION) generic $(if $(PEOPLE),--people $(PEOPLE))
 
 lips: setup
 	@$(VERMILION) lips "$(VIDEO)" $(if $(MODEL),--model "$(MODEL)") $(if $(SCAN),--scan "$(SCAN)") \

@@ -23,11 +23,12 @@ NOTICES = {
 }
 
 
-def make_generic(configuration: str, options: Sequence[str]) -> int:
+def make_generic(configuration: str, people: int | None, options: Sequence[str]) -> int:
     """Render, track and learn; then copy the regressor into `models/` of the project.
 
     Args:
         configuration: a YAML file, from the folder that the user is in.
+        people: how many takes of the sheet train, from the first on; None: all.
         options: of Snakemake. With `-n` nothing is made or copied.
 
     Returns:
@@ -39,7 +40,9 @@ def make_generic(configuration: str, options: Sequence[str]) -> int:
     path = place.from_here(whole, project) if whole.is_absolute() else configuration
     raw, results = read_keys(path), results_folder(path)
     takes, _ = read_takes(str(raw.get("takes", Configuration.model_fields["takes"].default)))
-    skipped = dict(raw.get("skip_takes", {}))
+    rest = takes[people:] if people else []
+    skipped = {take.name: f"beyond the first {people} rows" for take in rest}
+    skipped |= raw.get("skip_takes", {})
     code, _ = run_all(path, results, takes, [GENERIC, *options], skipped)
     made = results / "models" / f"{GENERIC}.h5"
     if code or not made.is_file() or {"-n", "--dry-run"} & set(options):
