@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.heads import small_studio, small_tracker
 from vermilion.config.apply import ApplyConfig
-from vermilion.config.own_head import head_checks
+from vermilion.config.own_head import head_checks, missing_heads
 from vermilion.config.root import Configuration
+from vermilion.config.takes import Take
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.head_binding import bind_head
 from vermilion.export.head_file import HeadFile, read_head
@@ -239,6 +240,18 @@ def test_polygons_and_texture_seams_of_an_obj_come_back(tmp_path):
     assert np.array_equal(cut.source[cut.polygons.corners], polygons.corners)
     assert np.allclose(cut.uv[cut.polygons.corners], uv[corners], atol=1e-6)
     assert np.array_equal(cut.source[: tracker.n_vertices], np.arange(tracker.n_vertices))
+
+
+def test_a_head_that_is_not_there_is_named_for_each_subject(tmp_path):
+    (tmp_path / "anna.obj").write_text("v 0 0 0\n")
+    head = {"topology": f"{tmp_path}/{{subject}}.obj"}
+    configuration = Configuration(apply={"export": head, "takes": ["anna/shot", "ben/shot"]})
+    takes = [
+        Take(name, "shot", "video", "x.mov", 0, 9, 25.0, "none") for name in ("anna", "ben", "cid")
+    ]
+    (sentence,) = missing_heads(configuration, takes)
+    assert f"apply.export.topology: found no '{tmp_path}/ben.obj'" in sentence
+    assert "for subject ben" in sentence
 
 
 def test_a_head_is_named_by_its_file_and_needs_landmarks():

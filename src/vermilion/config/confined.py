@@ -71,6 +71,7 @@ def _data_paths(
         "evaluation.truth": configuration.evaluation.truth,
         "apply.export.topology": configuration.apply.head_of("{subject}"),
         "apply.export.head.landmarks": configuration.apply.export.head.landmarks,
+        "apply.export.rig": configuration.apply.export.rig,
     }
     for key, pattern in patterns.items():
         # Names of takes and cameras are no paths, so that what stands before them decides.
