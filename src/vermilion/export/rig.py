@@ -24,6 +24,7 @@ from vermilion.storage.errors import InputError
 SPARSE, SMOOTH = 2e-3, 2e-2  # mm^2 for a weight of 1
 _SWEEPS, _SETTLED = 400, 1e-5
 #: Rounds of weights and corrective in turn, until the lips come nearer by less than this share.
+_BLOCK = 64  # frames
 _ROUNDS, _GAIN = 20, 0.001
 _LIPS = 6.0  # weight of a vertex of the lips against one of the face
 _NEUTRAL = "neutral"
@@ -112,11 +113,16 @@ def solve_rig(animation: Animation, rig: NamedShapes, lips: np.ndarray) -> RigWe
     scaled = shapes * (trust / trust.sum())[:, None]
     flat = scaled.reshape(len(shapes), -1)
     gram = flat @ shapes.reshape(len(shapes), -1).T
-    target = moved.reshape(len(rows), -1) @ flat.T
+    # A long take of a whole head is large: no copy of it is made in double.
+    table = moved.reshape(len(rows), -1)
+    blocks = range(0, len(rows), _BLOCK)
+    target = np.concatenate([table[start : start + _BLOCK] @ flat.T for start in blocks])
+    single = shapes.reshape(len(shapes), -1).astype(np.float32)
     alone = weights = bounded_weights(gram, target)
 
     def left(weights: np.ndarray) -> np.ndarray:
-        return moved - np.tensordot(weights, shapes, axes=1).astype(np.float32)
+        known = (weights.astype(np.float32) @ single).reshape(moved.shape)
+        return np.subtract(moved, known, out=known)
 
     rest, off = left(weights), np.inf
     left_mm = np.linalg.norm(rest[:, lips], axis=2).mean(axis=1)
@@ -181,12 +187,13 @@ def bounded_weights(
 
 def _one_shape(rest: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The shape (V, 3) and weights (F,) in [0, 1] whose product is nearest to `rest` (F, V, 3)."""
-    scale = np.sqrt(trust)[:, None]
-    flat = (rest * scale).reshape(len(rest), -1).astype(np.float64)
+    flat = rest.reshape(len(rest), -1)
+    repeated = np.repeat(trust, 3)
     weights = np.ones(len(flat))
     for _ in range(50):
-        shape = weights @ flat / max(float(weights @ weights), 1e-12)
-        weights = np.maximum(flat @ shape / max(float(shape @ shape), 1e-12), 0.0)
+        shape = weights.astype(flat.dtype) @ flat / max(float(weights @ weights), 1e-12)
+        heavy = shape * repeated
+        along = flat @ heavy.astype(flat.dtype)
+        weights = np.maximum(along / max(float(shape @ heavy), 1e-12), 0.0).astype(np.float64)
     top = max(float(weights.max(initial=0.0)), 1e-12)
-    found = (shape * top).reshape(-1, 3) / scale
-    return found, weights / top
+    return (shape * top).reshape(-1, 3).astype(np.float64), weights / top
