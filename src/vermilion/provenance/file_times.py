@@ -14,9 +14,9 @@ _SLACK_S = 1.0
 
 
 def mend_future_times(results: Path, inputs: Iterable[Path], now_s: float) -> list[Path]:
-    """Set the times of results that lie in the future to now; refuse inputs of the user that do.
+    """Where jobs read results from the future, set all such results' times to now; refuse inputs of the user.
 
-    What the files hold is not touched, and Snakemake compares that before it makes anything again.
+    What the files hold is not touched. All get the same time, as Snakemake compares folders by nothing else.
 
     Args:
         results: the folder of results.
@@ -24,7 +24,7 @@ def mend_future_times(results: Path, inputs: Iterable[Path], now_s: float) -> li
         now_s: the time, seconds since the epoch.
 
     Returns:
-        the results whose times were set.
+        the files and folders of the results whose times were set.
 
     Raises:
         InputError: a file of the user is from the future.
@@ -41,9 +41,18 @@ def mend_future_times(results: Path, inputs: Iterable[Path], now_s: float) -> li
             "its time.",
             path=latest,
         )
-    for path in ahead:
-        os.utime(_carrier(path), (now_s, now_s))
-    return sorted(ahead)
+    return _set_back(results, now_s) if ahead else []
+
+
+def _set_back(results: Path, now_s: float) -> list[Path]:
+    """Give everything in the results that is from the future the time of now."""
+    mended = []
+    for place, _, files in os.walk(results):
+        for path in (Path(place), *(Path(place, name) for name in files)):
+            if path.lstat().st_mtime > now_s + _SLACK_S:
+                os.utime(path, (now_s, now_s), follow_symlinks=False)
+                mended.append(path)
+    return sorted(mended)
 
 
 def _carrier(path: Path) -> Path:
