@@ -75,10 +75,16 @@ def run(project, *options, user=None):
     return done.returncode, done.stdout + done.stderr
 
 
-def remove_one_job(results: Path, chance: random.Random) -> tuple[str, int]:
-    """Remove what one job made, below `results`; returns its first output, and how many bytes that were."""
+def remove_one_job(
+    results: Path, chance: random.Random, only_files: bool = False
+) -> tuple[str, int]:
+    """Remove what one job made, below `results`; returns its first output, and how many bytes that were.
+
+    With `only_files`, of a job without folders: what reads a folder that is made again runs again.
+    """
     ledger = read_table(results / checksums.LEDGER)
-    job = chance.choice(sorted(set(ledger["job"])))
+    left_out = set(ledger["job"][ledger["output"] != ledger["path"]]) if only_files else set()
+    job = chance.choice(sorted(set(ledger["job"]) - left_out))
     freed = 0
     for name in set(ledger["output"][ledger["job"] == job]):
         path = results / name
@@ -126,7 +132,7 @@ def test_full_disk(finished, on_small_disk):
         disk.remount("size=4g")
         project.snakemake(target)
         assert results.digests() == expected and results.hidden() == []
-    assert project.would_run() == {}
+        assert project.would_run(target) == {}
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a small disk")
@@ -170,7 +176,7 @@ if any(".snakemake/scripts" in word for word in sys.orig_argv):
 def test_file_system_that_shows_files_late(finished, tmp_path):
     """What a job wrote appears three seconds after its end, as on a network file system."""
     expected = Results(finished.results).digests()
-    output, _ = remove_one_job(finished.results, random.Random(SEED))
+    output, _ = remove_one_job(finished.results, random.Random(SEED), only_files=True)
     (tmp_path / "sitecustomize.py").write_text(LATE)
     environment = finished.environment()
     environment["PYTHONPATH"] = f"{tmp_path}{os.pathsep}{environment['PYTHONPATH']}"
@@ -191,7 +197,7 @@ def test_file_system_that_shows_files_late(finished, tmp_path):
 def test_clock_set_back(finished):
     """Results from the future are used, and nothing else is made again; an image from the future is named."""
     expected = Results(finished.results).digests()
-    output, _ = remove_one_job(finished.results, random.Random(SEED))
+    output, _ = remove_one_job(finished.results, random.Random(SEED), only_files=True)
     target = str(finished.results.relative_to(finished.folder) / output)
     future = time.time() + 7200
     for path in finished.results.rglob("*"):

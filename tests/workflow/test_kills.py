@@ -16,11 +16,15 @@ ALL = int(os.environ.get("VERMILION_KILLS", "0"))
 SEED = int(os.environ.get("VERMILION_KILLS_SEED", "1"))
 
 
-def test_a_few_kills_of_a_finished_run(finished):
+def test_a_few_kills_of_a_finished_run(finished, tmp_path):
     """Part of the results is made again under kills."""
-    run = DisturbedRun(finished, Results(finished.results).digests(), SEED)
+    expected = Results(finished.results).digests()
+    project = Project(tmp_path / "project", finished.configuration)
+    shutil.copytree(finished.folder, project.folder, symlinks=True)
+    run = DisturbedRun(project, expected, SEED)
     run.kill(SAMPLE, pauses_s=(3.0,))
-    run.finish()
+    run.complete()
+    assert run.kills.total() == SAMPLE and run.completed >= 1
 
 
 @pytest.mark.skipif(not ALL, reason="make test-kills: about an hour")
