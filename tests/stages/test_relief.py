@@ -51,8 +51,19 @@ def run_stage(root, paths):
     out = root / "relief"
     files["light"] = out / "light.npz"
     place = {"subject": "s", "take": "t"}
-    made = {"light": files["light"], "topology": out / "topology.obj"}
-    run_script("detail/relief_light", wildcards=place, params=params, input=files, output=made)
+    files["start"] = out / "light_start.npz"
+    made = {"light": files["start"], "topology": out / "topology.obj"}
+    run_script("detail/relief_start", wildcards=place, params=params, input=files, output=made)
+    evidence = [out / "light" / f"{path.stem}.npz" for path in paths]
+    for part in evidence:
+        first, last = (int(n) for n in part.stem.split("-"))
+        params["frames"] = list(range(first, last + 1))
+        made = {"evidence": part}
+        run_script(
+            "detail/relief_evidence", wildcards=place, params=params, input=files, output=made
+        )
+    inputs, made = {**files, "evidence": evidence}, {"light": files["light"]}
+    run_script("detail/relief_light", wildcards=place, params=params, input=inputs, output=made)
     reliefs = [out / "relief" / f"{path.stem}.npz" for path in paths]
     for relief in reliefs:
         first, last = (int(n) for n in relief.stem.split("-"))

@@ -177,7 +177,7 @@ def test_relief_of_a_take(finished):
     def change(content):
         content["detail"] = {"relief": {"takes": [TAKE]}}
 
-    added = {"relief_light", "relief", "relief_meshes"}
+    added = {"relief_start", "relief_evidence", "relief_light", "relief", "relief_meshes"}
     with configured(finished, change):
         assert set(finished.would_run()) == added | {"ablations", "lips_page", "quality", "summary"}
 
@@ -186,7 +186,14 @@ def test_relief_after_the_corrective_flow(finished):
     def change(content):
         content["detail"] = {"takes": [TAKE], "relief": {"takes": [TAKE]}}
 
-    added = {"detail_flow", "relief_light", "relief", "relief_meshes"}
+    added = {
+        "detail_flow",
+        "relief_start",
+        "relief_evidence",
+        "relief_light",
+        "relief",
+        "relief_meshes",
+    }
     with configured(finished, change):
         assert set(finished.would_run()) == added | {"ablations", "lips_page", "quality", "summary"}
 

@@ -84,16 +84,92 @@ rule detail_flow:
         "../scripts/detail/detail_flow.py"
 
 
-rule relief_light:
-    """One light, albedo and noise of a take from its first frames: detail/relief/light.npz."""
+rule relief_start:
+    """Light, albedo and noise of a take from its first frames: detail/relief/light_start.npz."""
     input:
         images=mono_images,
         tracker=tracker_of,
         fit=P.fit,
         meshes=meshes_before_relief,
     output:
-        light=P.relief_light,
+        light=P.relief_start,
         topology=P.relief_topology,
+    log:
+        P.log("relief_start", "take"),
+    benchmark:
+        P.benchmark("relief_start", "take")
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(30),
+    params:
+        cfg=cfg_of(
+            "detail.relief.levels",
+            "detail.relief.spacing_mm",
+            "detail.relief.face_px",
+            "detail.relief.light_frames",
+            "detail.relief.detail_mm",
+            "detail.relief.curvature_sigma",
+            "detail.relief.displacement_sigma_mm",
+            "detail.relief.standing_share",
+            "detail.relief.noise_floor",
+            "detail.relief.misplaced_mm",
+            "detail.relief.iterations",
+        ),
+        code=code_of("detail/relief_start"),
+        source=mono_source,
+        span=take_span,
+    script:
+        "../scripts/detail/relief_start.py"
+
+
+rule relief_evidence:
+    """What each frame of a chunk tells of the light, on its relief: detail/relief/light/{chunk}.npz."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        fit=P.fit,
+        meshes=chunk_before_relief,
+        start=P.relief_start,
+    output:
+        evidence=P.relief_evidence,
+    log:
+        P.log("relief_evidence", "chunk"),
+    benchmark:
+        P.benchmark("relief_evidence", "chunk")
+    resources:
+        mem_mb=growing(2000),
+        runtime=growing(60),
+    params:
+        cfg=cfg_of(
+            "detail.relief.levels",
+            "detail.relief.spacing_mm",
+            "detail.relief.face_px",
+            "detail.relief.detail_mm",
+            "detail.relief.curvature_sigma",
+            "detail.relief.displacement_sigma_mm",
+            "detail.relief.standing_share",
+            "detail.relief.noise_floor",
+            "detail.relief.misplaced_mm",
+            "detail.relief.iterations",
+        ),
+        code=code_of("detail/relief_evidence"),
+        source=mono_source,
+        frames=chunk_frames,
+    script:
+        "../scripts/detail/relief_evidence.py"
+
+
+rule relief_light:
+    """One light that fits all frames, albedo and noise under it: detail/relief/light.npz."""
+    input:
+        images=mono_images,
+        tracker=tracker_of,
+        fit=P.fit,
+        meshes=meshes_before_relief,
+        start=P.relief_start,
+        evidence=per_chunk(P.relief_evidence),
+    output:
+        light=P.relief_light,
     log:
         P.log("relief_light", "take"),
     benchmark:
@@ -104,9 +180,15 @@ rule relief_light:
     params:
         cfg=cfg_of(
             "detail.relief.levels",
+            "detail.relief.spacing_mm",
             "detail.relief.face_px",
-            "detail.relief.light_frames",
             "detail.relief.detail_mm",
+            "detail.relief.curvature_sigma",
+            "detail.relief.displacement_sigma_mm",
+            "detail.relief.standing_share",
+            "detail.relief.noise_floor",
+            "detail.relief.misplaced_mm",
+            "detail.relief.iterations",
         ),
         code=code_of("detail/relief_light"),
         source=mono_source,
@@ -135,10 +217,12 @@ rule relief:
     params:
         cfg=cfg_of(
             "detail.relief.levels",
+            "detail.relief.spacing_mm",
             "detail.relief.face_px",
             "detail.relief.detail_mm",
             "detail.relief.curvature_sigma",
             "detail.relief.displacement_sigma_mm",
+            "detail.relief.standing_share",
             "detail.relief.noise_floor",
             "detail.relief.misplaced_mm",
             "detail.relief.iterations",
@@ -177,6 +261,7 @@ rule relief_meshes:
     params:
         cfg=cfg_of(
             "detail.relief.levels",
+            "detail.relief.spacing_mm",
             "detail.relief.face_px",
             "detail.relief.window",
             "detail.relief.position_weight",

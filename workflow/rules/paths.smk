@@ -124,6 +124,8 @@ class P:
     flow = _TAKE + "/detail/flow/{chunk}.npy"
     flow_quality = _TAKE + "/detail/quality/{chunk}.tsv"
     flow_overlay = _TAKE + "/detail/overlay/{chunk}.png"
+    relief_start = _TAKE + "/detail/relief/light_start.npz"
+    relief_evidence = _TAKE + "/detail/relief/light/{chunk}.npz"
     relief_light = _TAKE + "/detail/relief/light.npz"
     relief_topology = _TAKE + "/detail/relief/topology.obj"
     relief = _TAKE + "/detail/relief/frames/{chunk}.npz"

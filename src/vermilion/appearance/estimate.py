@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vermilion.appearance.harmonics import harmonics, irradiance
+from vermilion.appearance.harmonics import harmonics, irradiance, lit
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -36,11 +36,21 @@ class SampleObservations:
         colours: (M, L, N, 3) linear RGB.
         normals: (M, N, 3) unit normals, camera frame.
         trust: (M, N) in [0, 1]; zero where not seen.
+        transfer: (M, N, 9, 9) what reaches each sample of the light (`light_transfer`); None: all.
     """
 
     colours: np.ndarray
     normals: np.ndarray
     trust: np.ndarray
+    transfer: np.ndarray | None = None
+
+    @property
+    def basis(self) -> np.ndarray:
+        """Harmonics (M, N, 9) of the light at each sample."""
+        basis = harmonics(self.normals)
+        if self.transfer is None:
+            return basis
+        return np.einsum("mnk,mnkj->mnj", basis, self.transfer)
 
 
 @dataclass(frozen=True)
@@ -115,23 +125,23 @@ def estimate_appearance(
         InputError: the images show no skin.
     """
     finest, trust = seen.colours[:, 0], seen.trust
-    basis = harmonics(seen.normals)
+    basis = seen.basis
     skin = median_colour(finest, trust)
     light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
     for _ in range(_ROUNDS):
-        shading = irradiance(seen.normals, light)
+        shading = lit(basis, light)
         skin = median_colour(finest / shading, trust)
         albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
         light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
     # Images do not distinguish a bright light on dark skin from a dim light on fair skin, nor their
     # colours: the mean light on the face is set to white, the skin's mean albedo to SKIN_ALBEDO.
     weight = trust / max(trust.sum(), 1e-12)
-    mean = np.einsum("mn,mnc->c", weight, irradiance(seen.normals, light))
+    mean = np.einsum("mn,mnc->c", weight, lit(basis, light))
     light = light / mean
-    skin = median_colour(finest / irradiance(seen.normals, light), trust)
+    skin = median_colour(finest / lit(basis, light), trust)
     light = light * (skin.mean() / SKIN_ALBEDO)
     skin = skin * (SKIN_ALBEDO / skin.mean())
-    shading = irradiance(seen.normals, light)
+    shading = lit(basis, light)
     albedo = np.stack(
         [
             fit_albedo(seen.colours[:, level], shading, trust, skin, albedo_prior)
@@ -177,6 +187,28 @@ def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
         error = slope * (values - albedos * (light.T @ rows))
         robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
     return light
+
+
+def light_equations(
+    basis: np.ndarray, colours: np.ndarray, trust: np.ndarray, albedo: np.ndarray, light: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normal equations (3, 9, 9) and (3, 9) of the light of samples whose albedo is known, a channel each.
+
+    A sample counts by its trust, and less the worse a light that is known roughly explains it.
+
+    Args:
+        basis: (N, 9) harmonics of the light at each sample.
+        colours: (N, 3) linear RGB.
+        trust: (N,) weights.
+        albedo: (N, 3) linear RGB.
+        light: (9, 3) harmonics, roughly.
+    """
+    slope = display_slope(colours)
+    error = slope * (colours - albedo * lit(basis, light))
+    weight = trust[:, None] * slope**2 / (1.0 + (error / _ROBUST) ** 2)
+    rows = np.ascontiguousarray(basis.T)
+    matrices = [(rows * weighted) @ rows.T for weighted in (weight * albedo**2).T]
+    return np.stack(matrices), (rows @ (weight * albedo * colours)).T
 
 
 def fit_albedo(

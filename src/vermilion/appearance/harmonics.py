@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+_FLOOR = 0.02  # share of the mean light
+
 
 def harmonics(normals: np.ndarray) -> np.ndarray:
     """Harmonics (..., 9) of unit normals (..., 3): 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
@@ -29,7 +31,15 @@ def harmonics_jacobian(normals: np.ndarray) -> np.ndarray:
 def irradiance(normals: np.ndarray, light: np.ndarray) -> np.ndarray:
     """Light (..., 3), linear RGB, on a white surface with unit `normals` (..., 3).
 
-    `light` (9, 3) are coefficients. Values have a positive floor, because others divide by them.
+    `light` (9, 3) are coefficients, or (..., 9, 3) those that reach each normal's place. Values have a
+    positive floor, because others divide by them.
     """
-    floor = 0.02 * np.abs(light[0])
-    return np.maximum(harmonics(normals) @ light, floor)
+    if light.ndim == 2:
+        return lit(harmonics(normals), light)
+    found = (harmonics(normals)[..., None, :] @ light)[..., 0, :]
+    return np.maximum(found, _FLOOR * np.abs(light[..., 0, :]))
+
+
+def lit(basis: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Light (..., 3) of `light` (9, 3) where its harmonics are `basis` (..., 9), with that floor."""
+    return np.maximum(basis @ light, _FLOOR * np.abs(light[0]))

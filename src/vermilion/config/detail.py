@@ -73,10 +73,13 @@ class ReliefConfig(StageConfig):
         description="Takes (subject/take) of role video or tattoo that get relief; none by default.",
     )
     levels: int = Field(
-        1,
-        ge=0,
-        le=3,
-        description="Subdivisions of the coarse mesh (count); each one costs fourfold.",
+        5, ge=0, le=6, description="Most subdivisions of the coarse mesh's skin (count)."
+    )
+    spacing_mm: float = Field(
+        2.5,
+        gt=0,
+        le=100,
+        description="Edges of the skin that are longer are halved; half the length costs fourfold (mm).",
     )
     light_frames: int = Field(
         10,
@@ -97,10 +100,17 @@ class ReliefConfig(StageConfig):
         description="Shading that changes over longer ranges is attributed to light and coarse mesh (mm).",
     )
     curvature_sigma: float = Field(
-        0.03, gt=0, le=10, description="Typical curvature of the relief; less is smoother (1 / mm)."
+        0.06, gt=0, le=10, description="Typical curvature of the relief; less is smoother (1 / mm)."
     )
     displacement_sigma_mm: float = Field(
         0.3, gt=0, le=100, description="Typical height of the relief (mm)."
+    )
+    standing_share: float = Field(
+        0.25,
+        ge=0,
+        le=1,
+        description="Curvature and height of the relief that is there in all of the first frames, as a share "
+        "of those that come and go: paint that never changes looks alike. 0: all of it is paint.",
     )
     noise_floor: float = Field(
         1.0,

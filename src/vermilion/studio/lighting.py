@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vermilion.geometry.raycast import RayCaster
+from vermilion.geometry.sphere import sphere_points
 from vermilion.studio import light_kernels
 
 #: Rays start this far off the surface (mm), so that a vertex does not shade itself.
@@ -130,15 +131,6 @@ def bake_light(
         free = ~caster.occluded(origins[:count], rays[:count])
         np.add.at(visible, (owner[:count][free, 0], owner[:count][free, 1]), 1.0 / n_points)
     return BakedLight(sky, visible)
-
-
-def sphere_points(count: int) -> np.ndarray:
-    """Even directions over the sphere (Fibonacci spiral), (count, 3) float64."""
-    index = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * index / count
-    angle = np.pi * (3.0 - np.sqrt(5.0)) * index
-    radius = np.sqrt(1.0 - z**2)
-    return np.stack([radius * np.cos(angle), z, radius * np.sin(angle)], axis=1)
 
 
 def _buffers(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

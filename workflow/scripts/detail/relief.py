@@ -13,7 +13,9 @@ from vermilion.provenance.begun_run import begin_job
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    topology = FineTopology.of(FaceModel.load(inputs.tracker), cfg["detail.relief.levels"])
+    topology = FineTopology.of(
+        FaceModel.load(inputs.tracker), cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"]
+    )
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
     span = (params.frames[0], params.frames[-1])
     scene = ReliefScene.open(topology, inputs, source, span, cfg["detail.relief.face_px"])

@@ -1,47 +1,33 @@
-"""One light, albedo and noise of a take from its first frames, and the topology of its relief."""
+"""One light that fits all frames of a take, and the albedo of its first frames under it."""
+
+from dataclasses import fields, replace
 
 from vermilion.detail.relief.frames import ReliefScene
-from vermilion.detail.relief.light import estimate_light
+from vermilion.detail.relief.light import ClipLight
+from vermilion.detail.relief.light_evidence import LightEvidence, fitted_light
+from vermilion.detail.relief.relief import ReliefSettings
+from vermilion.detail.relief.standing_relief import with_standing_relief
 from vermilion.detail.relief.topology import FineTopology
-from vermilion.export.objs import write_obj
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.provenance.begun_run import begin_job
-from vermilion.storage.errors import InputError
-from vermilion.tracking.result import TrackedTake
 
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    model = FaceModel.load(inputs.tracker)
-    topology = FineTopology.of(model, cfg["detail.relief.levels"])
-    first, last = params.span
-    place = (snakemake.wildcards.subject, snakemake.wildcards.take)
-    source = open_frames(params.source, *place)
-    scene = ReliefScene.open(topology, inputs, source, (first, last), cfg["detail.relief.face_px"])
-    fit, count = TrackedTake.load(inputs.fit), cfg["detail.relief.light_frames"]
-    frames, seen = fit.frames[fit.valid & (fit.pieces == fit.pieces[0])][:count].tolist(), {}
-    for frame in frames:
-        try:
-            seen[frame] = scene.observe(frame, scene.fine(frame))
-        except (InputError, ValueError):  # no image, or the face is not in it
-            continue
-    if not any(observed.trust.any() for observed in seen.values()):
-        raise InputError(
-            f"no face in the first frames, {', '.join(map(str, frames)) or 'none of which was tracked'}",
-            "a first frame that shows the face",
-            "Begin the take where the face is seen, or raise detail.relief.light_frames.",
-            subject=place[0],
-            take=place[1],
-        )
-    smooth = scene.fine(first)
-    centres = smooth[topology.skin_ids][topology.skin].mean(axis=1)
-    light = estimate_light(
-        list(seen), list(seen.values()), topology, centres, cfg["detail.relief.detail_mm"]
+    topology = FineTopology.of(
+        FaceModel.load(inputs.tracker), cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"]
     )
-    light.save(snakemake.output.light)
-    uv = topology.finer @ model.uv
-    write_obj(snakemake.output.topology, smooth, topology.triangles, uv)
+    source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
+    scene = ReliefScene.open(topology, inputs, source, params.span, cfg["detail.relief.face_px"])
+    settings = ReliefSettings(
+        **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
+    )
+    start = ClipLight.load(inputs.start)
+    light = fitted_light([LightEvidence.load(path) for path in inputs.evidence], start.light)
+    first = {frame: scene.observe(frame, scene.fine(frame)) for frame in start.frames.tolist()}
+    found = with_standing_relief(replace(start, light=light), scene, first, settings)
+    found.save(snakemake.output.light)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
-    topology = FineTopology.of(model, cfg["detail.relief.levels"])
+    topology = FineTopology.of(model, cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"])
     first, last = params.span
     own, fit = (params.frames[0], params.frames[-1]), TrackedTake.load(inputs.fit)
     source = open_frames(params.source, *place)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -81,6 +81,10 @@ class ReliefScene:
         """Smooth fine mesh (V', 3) mm of a frame, world."""
         return self.topology.refine(self.read_mesh(frame))
 
+    def centres(self, frame: int) -> np.ndarray:
+        """Centres (Q, 3) mm of the skin's triangles in the smooth fine mesh of a frame, world."""
+        return self.fine(frame)[self.topology.skin_ids][self.topology.skin].mean(axis=1)
+
     def observe(self, frame: int, fine_mm: np.ndarray) -> SkinObservation:
         """Colours of the skin of a fine mesh `fine_mm` (V', 3) in a frame's image.
 
@@ -90,6 +94,24 @@ class ReliefScene:
         """
         image, skin = self.read_image(frame), fine_mm[self.topology.skin_ids]
         return FaceImage.of(image, self.camera, skin, self.face_px).observe(fine_mm, self.topology)
+
+    def observe_relief(
+        self, frame: int, light: ClipLight, settings: ReliefSettings
+    ) -> SkinObservation:
+        """The skin in a frame's image with the normals of its relief under a light; raises as `observe`."""
+        fine = self.fine(frame)
+        observed, skin = self.observe(frame, fine), fine[self.topology.skin_ids]
+        rotation = self.camera.rotation
+        along = solve_relief(skin, rotation, observed, light, self.topology, settings)
+        return self.raised(observed, skin, along)
+
+    def raised(
+        self, observed: SkinObservation, skin_mm: np.ndarray, along_mm: np.ndarray
+    ) -> SkinObservation:
+        """`observed` with the normals of the smooth skin (S, 3), world, moved along its own by (S,) mm."""
+        moved = skin_mm + along_mm[:, None] * vertex_normals(skin_mm, self.topology.skin)
+        normals = triangle_normals(moved, self.topology.skin) @ self.camera.rotation.T
+        return replace(observed, normals=normals)
 
 
 @dataclass(frozen=True)
@@ -220,7 +242,7 @@ def shading_errors(
         camera: of the image.
     """
     normals = triangle_normals(fine_mm[topology.skin_ids], topology.skin) @ camera.rotation.T
-    error = np.abs(observed.colours - light.values(normals)).mean(axis=1)
+    error = np.abs(observed.colours - light.reaching(observed).values(normals)).mean(axis=1)
     return np.where(observed.trust * (light.seen > 0) > 0, error, np.nan)
 
 

@@ -29,14 +29,16 @@ class ReliefSettings:
             coarse mesh.
         curvature_sigma: typical mean curvature of the displacement, 1 / mm.
         displacement_sigma_mm: typical displacement.
+        standing_share: curvature and displacement of the relief that is always there, as a share; 0: none.
         noise_floor: least deviation of a value (display values, 0 to 255).
         misplaced_mm: typical error of a place on the skin: edges of the albedo are trusted less.
         iterations: Gauss-Newton steps.
     """
 
     detail_mm: float = 8.0
-    curvature_sigma: float = 0.03
+    curvature_sigma: float = 0.06
     displacement_sigma_mm: float = 0.3
+    standing_share: float = 0.25
     noise_floor: float = 1.0
     misplaced_mm: float = 0.5
     iterations: int = 2
@@ -53,9 +55,9 @@ def solve_relief(
     """Displacements (S,) mm of the skin along its normals.
 
     Gauss-Newton on three terms: the high-pass part of the triangles' values, with Cauchy weights and
-    a deviation for each value; the mean curvature of the displacements; their size. Comparing high-pass
-    values makes shading gradients agree (Mono13 8) without amplifying noise as differences of
-    neighbours do. The skin's border does not move.
+    a deviation for each value; mean curvature and size of what the displacements differ from the relief
+    that is always there. Comparing high-pass values makes shading gradients agree (Mono13 8) without
+    amplifying noise as differences of neighbours do. The skin's border does not move.
 
     Args:
         skin_mm: (S, 3) smooth skin, world.
@@ -65,18 +67,18 @@ def solve_relief(
         topology: of the skin.
         settings: priors and noise.
     """
+    light = light.reaching(observed)
     normals = vertex_normals(skin_mm, topology.skin)
-    n = len(skin_mm)
     trust = observed.trust * (light.seen > 0)
     if not trust.any():
-        return np.zeros(n)
+        return light.standing_mm.copy()
     centres = skin_mm[topology.skin].mean(axis=1)
     detail = HighPassFilter(topology.pairs, centres, trust, settings.detail_mm)
     sigma = value_deviation(light, observed, topology, centres, settings)
     stiff = _regulariser(skin_mm, topology, settings)
     areas = triangle_areas(skin_mm, topology.skin)
     worth = trust * np.minimum(areas / _SAMPLE_MM2, 1.0)
-    along, scale = np.zeros(n), None
+    along, scale = light.standing_mm, None
     for _ in range(settings.iterations):
         points = skin_mm + along[:, None] * normals
         cross = triangle_cross(points, topology.skin)
@@ -90,7 +92,7 @@ def solve_relief(
         jacobian = _jacobian(points, cross, normals, slope, topology.skin)
         weight = worth / (sigma**2 + (error / _ROBUST_SIGMAS) ** 2)
         weighted = jacobian.T @ sparse.diags(weight)
-        right = weighted @ error - stiff @ along
+        right = weighted @ error - stiff @ (along - light.standing_mm)
         along = along + CholeskyFactor((weighted @ jacobian + stiff).tocsc()).solve(right)
     return along
 
@@ -130,7 +132,7 @@ def value_deviation(
     """Typical error (Q,) of the triangles' values: image noise, and misplaced edges of the albedo.
 
     Args:
-        light: of the take.
+        light: that reaches the triangles.
         observed: image at the skin's triangles.
         topology: of the skin.
         centres_mm: (Q, 3) of the triangles.

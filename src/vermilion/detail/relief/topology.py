@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.appearance.samples import skin
-from vermilion.detail.relief.subdivision import loop_subdivision
+from vermilion.detail.relief.subdivision import loop_subdivision_to
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import boundary_edges, submesh, unique_edges
 
@@ -42,10 +42,19 @@ class FineTopology:
     border: np.ndarray
 
     @classmethod
-    def of(cls, model: FaceModel, levels: int) -> FineTopology:
-        """Topology of a face model; the skin is without eyes, mouth and the border of the mesh."""
-        finer, triangles = loop_subdivision(model.triangles, model.n_vertices, levels)
-        keep = finer @ skin(model, _BORDER_RINGS).astype(float) > 0.999
+    def of(cls, model: FaceModel, levels: int, spacing_mm: float) -> FineTopology:
+        """Topology of a face model; the skin is without eyes, mouth and the border of the mesh.
+
+        Args:
+            model: coarse.
+            levels: most subdivisions.
+            spacing_mm: edges of the skin that are longer are halved.
+        """
+        coarse = skin(model, _BORDER_RINGS)
+        finer, triangles = loop_subdivision_to(
+            model.neutral_mm, model.triangles, levels, spacing_mm, coarse
+        )
+        keep = finer @ coarse.astype(float) > 0.999
         return cls.of_mask(finer, triangles, keep)
 
     @classmethod
