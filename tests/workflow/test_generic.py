@@ -1,5 +1,9 @@
 """A generic regressor of three synthetic people: from their uncalibrated videos to a file, and onto a fourth."""
 
+import re
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import yaml
@@ -52,6 +56,20 @@ def test_truth_is_read_by_the_database_of_a_generic_regressor_alone(project):
     # The renderer needs the camera, which nobody else is told.
     assert {name for name in readers if not name.startswith("studio_take_")} == {"generic_database"}
     assert not {rule for rule, _, _ in jobs} & {"multiview_neutral", "layers", "correspondence"}
+
+
+@pytest.mark.slow
+def test_the_command_plans_the_regressor_of_the_first_people_alone(project):
+    words = ["generic", "--configuration", project.configuration, "--people", "2", "-n"]
+    command = [sys.executable, "-m", "vermilion.app", *words]
+    environment = project.environment()
+    run = subprocess.run(
+        command, cwd=project.folder, env=environment, capture_output=True, text=True
+    )
+    planned = run.stdout + run.stderr
+    assert run.returncode == 0, planned
+    assert re.search(r"^features +2$", planned, re.M) and re.search(r"^train +1$", planned, re.M)
+    assert not (project.folder / "models").exists()
 
 
 @pytest.mark.slow

@@ -21,6 +21,8 @@ NOTICES = {
     "ict": "Trained on synthetic people of ICT-FaceKit, Copyright (c) 2020 USC Institute for Creative "
     "Technologies, MIT licence: see LICENSE.ICT-FaceKit.",
 }
+#: A flag before it, as Snakemake takes what follows a configuration for one more.
+_TARGET = ("--nocolor", GENERIC)
 
 
 def make_generic(configuration: str, people: int | None, options: Sequence[str]) -> int:
@@ -28,7 +30,7 @@ def make_generic(configuration: str, people: int | None, options: Sequence[str])
 
     Args:
         configuration: a YAML file, from the folder that the user is in.
-        people: how many takes of the sheet train, from the first on; None: all.
+        people: how many of the takes that train are used, from the first on; None: all.
         options: of Snakemake. With `-n` nothing is made or copied.
 
     Returns:
@@ -40,10 +42,11 @@ def make_generic(configuration: str, people: int | None, options: Sequence[str])
     path = place.from_here(whole, project) if whole.is_absolute() else configuration
     raw, results = read_keys(path), results_folder(path)
     takes, _ = read_takes(str(raw.get("takes", Configuration.model_fields["takes"].default)))
-    rest = takes[people:] if people else []
-    skipped = {take.name: f"beyond the first {people} rows" for take in rest}
+    trained = [take for take in takes if take.train_frames()]
+    rest = trained[people:] if people else []
+    skipped = {take.name: f"beyond the first {people} that train" for take in rest}
     skipped |= raw.get("skip_takes", {})
-    code, _ = run_all(path, results, takes, [GENERIC, *options], skipped)
+    code, _ = run_all(path, results, takes, [*_TARGET, *options], skipped)
     made = results / "models" / f"{GENERIC}.h5"
     if code or not made.is_file() or {"-n", "--dry-run"} & set(options):
         return code

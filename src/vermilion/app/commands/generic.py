@@ -2,7 +2,7 @@
 
     vermilion generic
     vermilion generic -n                                what would run
-    vermilion generic --people 12                       those of the first twelve rows of the sheet alone
+    vermilion generic --people 12                       of the first twelve people of the sheet alone
     vermilion generic --configuration config/mine.yaml
 
 Sixty actors of the studio are rendered and tracked as a video of an unseen person is; what their tracks get
@@ -22,7 +22,7 @@ PASSES_ON = True
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The configuration; what follows goes to Snakemake."""
     parser.add_argument("--configuration", default=CONFIGURATION, help="a YAML file (%(default)s)")
-    parser.add_argument("--people", type=int, help="so many rows of the sheet; default all")
+    parser.add_argument("--people", type=int, help="so many people of the sheet; default all")
 
 
 def run(arguments: argparse.Namespace) -> int:
