@@ -14,6 +14,7 @@ from vermilion.config.regressors import (
     split_name,
     trained_on,
 )
+from vermilion.database.gather import motion_mm
 from vermilion.regression.model import load_model, save_model
 from vermilion.regression.training import Selection, train
 from vermilion.regression.training_set import TrainingSet
@@ -82,6 +83,14 @@ def test_a_shipped_file_is_small_says_its_origin_and_predicts_the_same(model, tm
     exact, packed = (load_model(path).predict(features) for path in (whole, shipped))
     assert packed.dtype == exact.dtype
     assert np.abs(packed - exact).max() < 2e-3 * np.abs(exact).max()
+
+
+def test_a_lost_mouth_stands_out_of_a_tracks_motion_but_a_wrong_neutral_does_not():
+    rng = np.random.default_rng(0)
+    off_mm = rng.normal(size=(1, 50, 3)) * 20.0 + 0.3 * rng.normal(size=(9, 50, 3))
+    off_mm[4, :, 1] += 10.0
+    found = motion_mm(off_mm, np.ones(50))
+    assert found[4] > 9.0 and np.delete(found, 4).max() < 1.0
 
 
 def test_names_and_rows():

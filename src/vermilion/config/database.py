@@ -16,6 +16,13 @@ class DatabaseConfig(StageConfig):
         le=9,
         description="Deflate level of the layers (0 to 9); 0: not compressed.",
     )
+    generic_most_motion_mm: float = Field(
+        6.0,
+        gt=0.0,
+        le=1000.0,
+        description="Database of a generic regressor: a frame trains nothing where the track misses the motion of the "
+        "lips by more (mm, mean over the vermilion, about the take's median). There it has lost the mouth.",
+    )
     min_common_mask: float = Field(
         0.5,
         gt=0.0,

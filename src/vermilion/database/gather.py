@@ -12,6 +12,17 @@ from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
 
+def motion_mm(displacement_mm: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """How far (F,) mm the motion of a track is off in each frame, each vertex's median over the take removed.
+
+    Args:
+        displacement_mm: (F, N, 3) from **C** to the truth.
+        weights: (N,) of the vertices in the mean.
+    """
+    moving = displacement_mm - np.median(displacement_mm, axis=0)
+    return np.linalg.norm(moving, axis=2) @ weights / weights.sum()
+
+
 def read_take_files(
     row: Mapping, layer_paths: Sequence[str | Path], feature_paths: Sequence[str | Path]
 ) -> tuple[TakeEntry, tuple[str, ...]]:

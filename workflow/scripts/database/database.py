@@ -33,7 +33,7 @@ def main(snakemake):
         names,
         entries,
         (read_take_files(*each)[0] for each in progress(files, "takes")),
-        **cfg.model_dump(),
+        **cfg.model_dump(exclude={"generic_most_motion_mm"}),
     )
 
 

@@ -8,10 +8,11 @@ from vermilion.config.database import DatabaseConfig
 from vermilion.correction.take_layers import displacements, quality_rows, take_layers
 from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.models import bind_models, model_correspondence
+from vermilion.database.gather import motion_mm
 from vermilion.database.schema import SubjectEntry, TakeEntry
 from vermilion.database.write import write_database
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import mesh_corners
+from vermilion.geometry.mesh import mesh_corners, vertex_areas
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_array, read_arrays
 from vermilion.storage.chunks import read_chunks
@@ -44,18 +45,21 @@ def layers_of(take, files, correspondence, face, cfg):
     return made
 
 
-def entry_of(take, files, correspondence, made):
-    """The take as the database has it."""
+def entry_of(take, files, correspondence, made, lips, most_motion_mm):
+    """The take as the database has it; `lips` (V,) are weights of the vermilion's vertices."""
     frames = TrackedTake.load(files["fit"]).frames
     measured = read_chunks(files["features"], frames, ["features", "valid"])
     valid = made.valid & measured["valid"] & np.isfinite(measured["features"]).all(axis=1)
     corners = mesh_corners(correspondence.coarse_triangles, correspondence.mask)
+    moved = displacements(made, corners)
+    valid[valid] &= motion_mm(moved[valid], lips[corners]) <= most_motion_mm
+    print(f"{take['subject']}/{take['take']}: {valid.sum()} of {len(frames)} frames")
     return TakeEntry(
         **{name: take[name] for name in ("subject", "take", "fps", "split")},
         frames=frames,
         features=np.where(valid[:, None], measured["features"], 0.0),
         layers=made.layers,
-        displacement_mm=displacements(made, corners),
+        displacement_mm=moved,
         valid=valid,
         train=np.isin(frames, take["train"]),
     )
@@ -82,11 +86,16 @@ def main(snakemake):
         own["coarse"] = [next(coarse) for _ in range(take["chunks"])]
         own["features"] = [next(features) for _ in range(take["chunks"])]
 
+    options = DatabaseConfig(**params.cfg["database"]).model_dump()
+    most_motion_mm = options.pop("generic_most_motion_mm")
+    vermilion = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
+    lips = np.where(vermilion, vertex_areas(face.neutral_mm, face.triangles), 0.0)
+
     def entries():
         for take, own in progress(list(zip(params.takes, files, strict=True)), "takes"):
             correspondence = maps[take["subject"]]
             made = layers_of(take, own, correspondence, face, cfg)
-            yield entry_of(take, own, correspondence, made)
+            yield entry_of(take, own, correspondence, made, lips, most_motion_mm)
 
     names = read_arrays(files[0]["features"][0], "features", ("names",))["names"]
     write_database(
@@ -95,7 +104,7 @@ def main(snakemake):
         [str(name) for name in names],
         list(people.values()),
         entries(),
-        **DatabaseConfig(**params.cfg["database"]).model_dump(),
+        **options,
     )
 
 
