@@ -110,7 +110,8 @@ test-kills: setup
 	VERMILION_KILLS=$${VERMILION_KILLS:-200} VERMILION_FULL_DISKS=$${VERMILION_FULL_DISKS:-10} \
 	    $(BIN)/python -m pytest -p no:cacheprovider -s tests/workflow/test_kills.py tests/workflow/test_disks.py
 
-# A real Slurm of two nodes on this machine; needs root. VERMILION_TEST_SLURM=all compares a whole run.
+# A real Slurm of two nodes on this machine; needs root. VERMILION_TEST_SLURM=all compares a whole run;
+# VERMILION_SLURM_ACCOUNTING=1: with an accounting database (slurmdbd, mariadb-server).
 test-slurm: setup
 	VERMILION_TEST_SLURM=$${VERMILION_TEST_SLURM:-1} $(BIN)/python -m pytest tests/slurm
 

@@ -17,6 +17,8 @@ from pathlib import Path
 
 import psutil
 
+from tests.slurm.accounting import CONFIGURATION, Accounting
+
 INSTALL = "apt-get install -y --no-install-recommends slurm-wlm munge"
 _MARK = "# written by Vermilion's tests"
 _FOLDER = Path("/etc/slurm")
@@ -37,8 +39,7 @@ SwitchType=switch/none
 JobAcctGatherType=jobacct_gather/linux
 JobAcctGatherFrequency=2
 JobAcctGatherParams=OverMemoryKill
-AccountingStorageType=accounting_storage/none
-SelectType=select/cons_tres
+{accounting}SelectType=select/cons_tres
 SelectTypeParameters=CR_Core_Memory
 SchedulerType=sched/backfill
 SchedulerParameters=batch_sched_delay=0,sched_min_interval=0
@@ -78,9 +79,10 @@ def why_not() -> str | None:
 class Cluster:
     """The cluster while a `with` lasts; partitions `main` (60 minutes) and `short` (5 minutes)."""
 
-    def __init__(self, run: Path, cores: int | None = None):
+    def __init__(self, run: Path, cores: int | None = None, accounting: bool = False):
         """A cluster that keeps its state in the folder `run`; `cores` a node, else half of the machine's."""
         self.run = run
+        self.accounting = Accounting(run / "accounting") if accounting else None
         self.cores = cores or max(1, (os.cpu_count() or 2) // 2)
 
     def __enter__(self) -> Cluster:
@@ -89,11 +91,18 @@ class Cluster:
         host = socket.gethostname().partition(".")[0]
         for folder in (self.run / "controller", self.run / "n1", self.run / "n2", _FOLDER):
             folder.mkdir(parents=True, exist_ok=True)
-        text = _CONFIGURATION.format(mark=_MARK, host=host, run=self.run, cores=self.cores)
+        none = "AccountingStorageType=accounting_storage/none\n"
+        accounting = CONFIGURATION if self.accounting else none
+        text = _CONFIGURATION.format(
+            mark=_MARK, host=host, run=self.run, cores=self.cores, accounting=accounting
+        )
         (_FOLDER / "slurm.conf").write_text(text, encoding="utf-8")
         # This plugin starts without touching a mount; neither jobs nor tasks use control groups here.
         (_FOLDER / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n", encoding="utf-8")
         self._start_munge()
+        if self.accounting:
+            self.accounting.__enter__()
+            self.accounting.register("vermilion")
         subprocess.run(["slurmctld", "-i"], check=True)
         for node in ("n1", "n2"):
             subprocess.run(["slurmd", "-N", node], check=True)
@@ -103,6 +112,8 @@ class Cluster:
     def __exit__(self, *_: object) -> None:
         for name in ("slurmd-n1", "slurmd-n2", "slurmctld"):
             self._stop(self.run / f"{name}.pid")
+        if self.accounting:
+            self.accounting.__exit__()
         (_FOLDER / "slurm.conf").unlink(missing_ok=True)
         (_FOLDER / "cgroup.conf").unlink(missing_ok=True)
         self._lock.close()

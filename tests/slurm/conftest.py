@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
+from tests.slurm import accounting
 from tests.slurm.cluster import Cluster, why_not
-from tests.slurm.runs import HELD, RIG_SCRIPT, RIGS, ROOT, Copy, files_of
+from tests.slurm.runs import HELD, RIG_SCRIPT, RIGS, ROOT, WITH_ACCOUNTING, Copy, files_of
 
 #: Nothing: no test; `sample`: a few of them; `1`: all, with the captures alone compared; `all`: everything compared.
 WANTED = os.environ.get("VERMILION_TEST_SLURM", "")
@@ -31,11 +32,11 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def cluster(tmp_path_factory):
-    """A Slurm of two nodes, without accounting."""
-    reason = why_not()
+    """A Slurm of two nodes."""
+    reason = why_not() or (accounting.why_not() if WITH_ACCOUNTING else None)
     if reason:
         pytest.skip(reason) if WANTED == "sample" else pytest.fail(reason)
-    with Cluster(tmp_path_factory.mktemp("slurm")) as running:
+    with Cluster(tmp_path_factory.mktemp("slurm"), accounting=WITH_ACCOUNTING) as running:
         yield running
 
 

@@ -20,6 +20,8 @@ RIGS = [
     f"results/tiny/captures/{take}/cameras/cameras.txt"
     for take in ("s1/plain", "s1/rom", "s2/plain")
 ]
+#: Whether the cluster has an accounting database, which the Slurm plugin then asks.
+WITH_ACCOUNTING = bool(os.environ.get("VERMILION_SLURM_ACCOUNTING"))
 RIG_SCRIPT = "workflow/scripts/studio/studio_rig.py"
 #: What the rigs' script does first in these copies: it says that it runs, and waits while a test holds it.
 HELD = """
@@ -127,7 +129,9 @@ def _let_be_interrupted() -> None:
 
 def on(profile: str) -> list[str]:
     """Options for a profile, with the tiny capture's own chunks."""
-    return ["--workflow-profile", f"profiles/{profile}", "--config", "chunk_frames=8"]
+    options = ["--workflow-profile", f"profiles/{profile}", "--config", "chunk_frames=8"]
+    asks = ["--slurm-status-command", "sacct"] if WITH_ACCOUNTING and profile == "slurm" else []
+    return [*options, *asks]
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
