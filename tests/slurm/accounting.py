@@ -6,6 +6,7 @@ import os
 import shutil
 import socket
 import subprocess
+import tempfile
 import time
 from pathlib import Path
 
@@ -42,19 +43,20 @@ def why_not() -> str | None:
 class Accounting:
     """The database and its daemon while a `with` lasts; munge must run."""
 
-    def __init__(self, run: Path):
-        self.run = run
+    def __init__(self):
+        # The database's user must get there, so it does not lie below a folder of pytest's.
+        self.run = Path(tempfile.mkdtemp(prefix="vermilion-accounting-"))
 
     def __enter__(self) -> Accounting:
         data, socket_file = self.run / "data", self.run / "mysqld.sock"
-        self.run.mkdir(parents=True)
         self.run.chmod(0o755)
         shutil.chown(self.run, "mysql")
         made = ["mariadb-install-db", "--user=mysql", f"--datadir={data}"]
+        made += [f"--tmpdir={self.run}"]
         subprocess.run(made, check=True, capture_output=True)
         words = ["mariadbd", "--no-defaults", "--user=mysql", f"--datadir={data}"]
         words += [f"--socket={socket_file}", "--skip-networking"]
-        words += ["--innodb_buffer_pool_size=128M"]
+        words += [f"--tmpdir={self.run}", "--innodb_buffer_pool_size=128M"]
         with open(self.run / "mariadb.log", "w") as log:
             self._database = subprocess.Popen(words, stdout=log, stderr=log)
         client = ["mariadb", f"--socket={socket_file}", "-e"]
@@ -81,6 +83,7 @@ class Accounting:
         self._database.wait(timeout=60)
         for path in (_FOLDER / "slurmdbd.conf", Path("/run/mysqld/mysqld.sock")):
             path.unlink(missing_ok=True)
+        shutil.rmtree(self.run, ignore_errors=True)
 
     def register(self, cluster: str) -> None:
         """Make the cluster, an account and root's place in it known."""

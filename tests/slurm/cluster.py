@@ -82,7 +82,7 @@ class Cluster:
     def __init__(self, run: Path, cores: int | None = None, accounting: bool = False):
         """A cluster that keeps its state in the folder `run`; `cores` a node, else half of the machine's."""
         self.run = run
-        self.accounting = Accounting(run / "accounting") if accounting else None
+        self.accounting = Accounting() if accounting else None
         self.cores = cores or max(1, (os.cpu_count() or 2) // 2)
 
     def __enter__(self) -> Cluster:

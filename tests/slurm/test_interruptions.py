@@ -134,7 +134,7 @@ def test_an_edited_configuration_changes_nothing_of_the_run_in_progress(cluster,
     run = start_held(project, cluster, profile)
     project.edit("config/tiny.yaml", "face_size_px: [240, 300]", "face_size_px: [280, 350]")
     project.edit(
-        "config/takes.tiny.tsv", "s1\trom\ttattoo\tstudio\t0\t11", "s1\trom\ttattoo\tstudio\t0\t9"
+        "config/takes.tiny.tsv", "s2\trom\ttattoo\tstudio\t0\t11", "s2\trom\ttattoo\tstudio\t0\t9"
     )
     (project.folder / RIG_SCRIPT).touch()
     project.release()
@@ -149,7 +149,7 @@ def test_jobs_refuse_code_that_was_edited_after_the_run_began(cluster, rigs, pro
     project, expected = rigs
     run = start_held(project, cluster, profile)
     running = {row[0] for row in project.started()}
-    edited = "    folder = Path(snakemake.output.cameras[0]).parent"
+    edited = "    write_truth(plan, Path(snakemake.output.truth[0]).parent)"
     project.edit(RIG_SCRIPT, edited, f"{edited}\n    Path('edited.txt').touch()")
     project.release()
     assert run.wait(timeout=300) != 0

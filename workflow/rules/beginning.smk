@@ -60,6 +60,7 @@ def link_to_local_copies(results):
         )
     link.parent.mkdir(parents=True, exist_ok=True)
     link.unlink(missing_ok=True)
+    copies.mkdir(parents=True, exist_ok=True)
     link.symlink_to(copies.absolute())
 
 
