@@ -2,7 +2,7 @@
 
 import asyncio
 
-from vermilion.app.unanswered_checks import keep_unanswered
+from vermilion.app.unanswered_checks import keep_unanswered, without_names
 
 
 class Executor:
@@ -49,3 +49,14 @@ def test_jobs_that_ended_are_not_and_jobs_that_go_on_come_once():
     assert executor.reported == [("b", "success"), ("c", "failed")]
     executor.answer = {}
     assert still_active(executor, ["a", "d"]) == ["a", "d"]
+
+
+def test_a_state_is_known_whoever_brought_it_about():
+    async def query(command, logger):
+        return ({"7": "CANCELLED by 1000", "8": "RUNNING"}, 0.1) if command else (None, None)
+
+    assert asyncio.run(without_names(query)("sacct", None)) == (
+        {"7": "CANCELLED", "8": "RUNNING"},
+        0.1,
+    )
+    assert asyncio.run(without_names(query)("", None)) == (None, None)

@@ -2,7 +2,7 @@
 
 from vermilion.app.orphaned_jobs import cancel_jobs, jobs_of_run, name_for
 from vermilion.app.partition_limits import impossible_jobs, read_partitions, requests_of
-from vermilion.app.unanswered_checks import keep_unanswered
+from vermilion.app.unanswered_checks import keep_unanswered, without_names
 
 #: With this begin the names or comments of all Slurm jobs that write into these results.
 SLURM_NAME = name_for(R)
@@ -71,3 +71,5 @@ def prepare_slurm():
     if hasattr(executor, "run_uuid"):
         executor.run_uuid = f"{SLURM_NAME}_{executor.run_uuid}"
         keep_unanswered(executor)
+        plugin = sys.modules[type(executor).__module__]
+        plugin.query_job_status = without_names(plugin.query_job_status)

@@ -1,13 +1,29 @@
-"""Jobs of a cluster are kept where a question about their state got no answer.
+"""Two states of jobs that the Slurm plugin (2.8) does not understand: the run would wait for ever for them.
 
-The Slurm plugin (2.8) forgets all jobs that it asked about while the controller did not answer: the run would
-then wait for ever for jobs that have long ended.
+It forgets all jobs that it asked about while the controller did not answer; and it does not know that a job ended of
+which the accounting database says who cancelled it (`CANCELLED by 1000`).
 """
 
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from typing import Any
+
+
+def without_names(query: Any) -> Any:
+    """The plugin's question for states, with the first word of each answer.
+
+    Args:
+        query: called with a command and a logger; gives (number of a job -> state, or None; seconds).
+    """
+
+    async def shortened(command: str, logger: Any) -> tuple[dict[str, str] | None, float | None]:
+        states, seconds = await query(command, logger)
+        if states is None:
+            return states, seconds
+        return {number: state.partition(" ")[0] for number, state in states.items()}, seconds
+
+    return shortened
 
 
 def keep_unanswered(executor: Any) -> None:
