@@ -133,9 +133,8 @@ def test_an_edited_configuration_changes_nothing_of_the_run_in_progress(cluster,
     project, expected = rigs
     run = start_held(project, cluster, profile)
     project.edit("config/tiny.yaml", "face_size_px: [240, 300]", "face_size_px: [280, 350]")
-    project.edit(
-        "config/takes.tiny.tsv", "s2\trom\ttattoo\tstudio\t0\t11", "s2\trom\ttattoo\tstudio\t0\t9"
-    )
+    row = "people\tlabelled\tvideo\tstudio\t0\t"
+    project.edit("config/takes.tiny.tsv", f"{row}23", f"{row}15")
     (project.folder / RIG_SCRIPT).touch()
     project.release()
     finish(run, project, expected, cluster)
