@@ -146,6 +146,26 @@ def test_a_small_or_blurred_face_is_flagged_with_its_size(tmp_path):
     assert sharp_eyes_px(blurred, found) < 0.6 * eyes
 
 
+@pytest.mark.parametrize(
+    ("degrees", "command"), [(90, "transpose=2"), (-90, "transpose=1"), (180, "hflip,vflip")]
+)
+def test_a_face_on_its_side_is_told_with_the_command_that_turns_it(tmp_path, degrees, command):
+    angle = np.radians(-degrees)  # in the image y runs down
+    across, up = LAYOUT[:, 0], LAYOUT[:, 1]
+    lying = np.column_stack(
+        [
+            np.cos(angle) * across - np.sin(angle) * up,
+            np.sin(angle) * across + np.cos(angle) * up,
+            LAYOUT[:, 2],
+        ]
+    )
+    found = follow(seen_of(tmp_path, [[face((300, 200), 160, shape=lying)]] * 3), choice())
+    assert found.valid.all() and f"turned by {abs(degrees)} degrees" in found.reason[0]
+    assert command in found.reason[0] and found.reason[1] == ""
+    upright = follow(seen_of(tmp_path, [[face((300, 200), 160)]] * 3), choice())
+    assert (upright.reason == "").all()
+
+
 def test_another_person_after_a_cut_is_told_and_left_out(tmp_path):
     other = LAYOUT * [1.12, 0.94, 0.8] + 3.0 * np.sin(LAYOUT / 17.0)
     images = [scene(1)] * 10 + [scene(2)] * 10 + [scene(1)] * 10

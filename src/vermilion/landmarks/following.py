@@ -15,6 +15,7 @@ import numpy as np
 from vermilion.landmarks.cuts import find_cuts, pieces_of
 from vermilion.landmarks.faces import SeenFaces
 from vermilion.landmarks.persons import other_persons
+from vermilion.landmarks.scheme import EYE_CORNERS
 from vermilion.storage.arrays import read_arrays, write_arrays
 
 NOT_FOUND = "no face found"
@@ -23,6 +24,8 @@ _STEP, _STEP_LATER, _PER_FRAME = 0.6, 1.0, 0.05
 _GROWTH, _GROWTH_LATER, _GROWTH_PER_FRAME = 0.35, 0.6, 0.02
 #: Chains with less than this share of the weight of the best are passing detections.
 _PASSING = 0.2
+#: The line of the eyes of a face that counts as upright is turned by at most this (degrees).
+_UPRIGHT_DEG = 50.0
 
 
 @dataclass(frozen=True)
@@ -223,7 +226,7 @@ def _told(
     )
     sharp = np.where(there, seen.sharp_eyes_px[row], np.nan) if len(seen.frame) else eyes
     valid, reasons = there.copy(), []
-    starts = np.flatnonzero(np.diff(piece, prepend=-1))
+    starts, turned = np.flatnonzero(np.diff(piece, prepend=-1)), _turned(seen, piece, row)
     for at in range(len(row)):
         told = []
         if at in starts[1:]:
@@ -243,6 +246,8 @@ def _told(
             told.append(_too_small(eyes[at], sharp[at], choice.least_eyes_px))
         if there[at] and at in starts and count[at] > 1:
             told.append(f"{count[at]} faces: {choice} is followed")
+        if at in turned:
+            told.append(turned[at])
         reasons.append("; ".join(told))
     return FollowedFace(
         seen.frames,
@@ -253,6 +258,24 @@ def _told(
         eyes,
         count,
     )
+
+
+def _turned(seen: SeenFaces, piece: np.ndarray, row: np.ndarray) -> dict[int, str]:
+    """Frame's place -> what is told of a piece, from there on, whose face is not upright in the image."""
+    told = {}
+    for number in np.unique(piece):
+        at = np.flatnonzero((piece == number) & (row >= 0))
+        if not len(at):
+            continue
+        x, y = np.median(np.diff(seen.shape[row[at]][:, EYE_CORNERS, :2], axis=1)[:, 0], axis=0)
+        degrees = float(np.degrees(np.arctan2(y, x)))
+        if abs(degrees) > _UPRIGHT_DEG:
+            turn = "hflip,vflip" if abs(degrees) > 135 else f"transpose={1 if degrees < 0 else 2}"
+            told[int(at[0])] = (
+                f"the face is turned by {abs(degrees):.0f} degrees in the image, and landmarks of such faces "
+                f"are off by millimetres: turn it upright, `ffmpeg -i in.mp4 -vf {turn} -crf 12 out.mp4`"
+            )
+    return told
 
 
 def _too_small(eyes_px: float, sharp_px: float, least_px: float) -> str:
