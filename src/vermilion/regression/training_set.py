@@ -46,8 +46,9 @@ class TrainingSet:
 
     @property
     def first_rows(self) -> np.ndarray:
-        """(G,) first row of each of the `subjects`: takes begin with the neutral."""
-        return np.unique(self.persons, return_index=True)[1]
+        """(G',) rows of the neutrals, with which takes begin, of the `subjects` whose first frame trains."""
+        first = np.unique(self.persons, return_index=True)[1]
+        return first[self.frames[first] == self.frames[first].min()]
 
     def frames_of_takes(self) -> dict[str, np.ndarray]:
         """Take -> frame numbers (n,) of its rows, of the takes that have any."""
