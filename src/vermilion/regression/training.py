@@ -136,16 +136,18 @@ def train(
     # These are for unseen subjects, so their folds hold out whole people.
     by_person = group in ("GR", GENERIC) and len(np.unique(data.persons)) >= LEAST_PEOPLE
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
-    weights = np.repeat(area_mm2 / area_mm2.mean(), 9)
+    # None of them where the model has no vertices.
+    places = data.displacements_mm[:, : 3 * len(vertices)] / np.float32(DISPLACEMENT_UNIT_MM)
+    gram = target_gram(data.layers, np.repeat(area_mm2 / area_mm2.mean(), 9))
+    if group == GENERIC:  # of the motion, layers tell folds less well apart
+        gram = target_gram(places)
     alphas, betas = selection.grid(kind)
     curve = cross_validate(
-        estimator, features, target_gram(data.layers, weights), data.sequences,
+        estimator, features, gram, data.sequences,
         data.persons if by_person else clips, alphas=alphas, betas=betas, n_folds=selection.folds,
         persons=persons,
     )  # fmt: skip
     estimator.set_params(**curve.parameters(selection.choice))
-    # None of them where the model has no vertices.
-    places = data.displacements_mm[:, : 3 * len(vertices)] / np.float32(DISPLACEMENT_UNIT_MM)
     targets = np.concatenate([data.layers, places], axis=1)
     estimator.fit(features, targets, data.sequences, persons, n_layers=data.layers.shape[1])
     novelty = held_out_novelty(estimator, features, data.sequences, clips, selection.folds)
