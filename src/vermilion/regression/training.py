@@ -22,6 +22,7 @@ from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import LinearOutputs
 from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
+from vermilion.regression.ridge import person_averages
 from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
 
@@ -138,12 +139,10 @@ def train(
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)
     # None of them where the model has no vertices.
     places = data.displacements_mm[:, : 3 * len(vertices)] / np.float32(DISPLACEMENT_UNIT_MM)
-    gram = target_gram(data.layers, np.repeat(area_mm2 / area_mm2.mean(), 9))
-    if group == GENERIC:  # of the motion, layers tell folds less well apart
-        gram = target_gram(places)
+    judged, gram = _judged(group, data, features, places, area_mm2)
     alphas, betas = selection.grid(kind)
     curve = cross_validate(
-        estimator, features, gram, data.sequences,
+        estimator, judged, gram, data.sequences,
         data.persons if by_person else clips, alphas=alphas, betas=betas, n_folds=selection.folds,
         persons=persons,
     )  # fmt: skip
@@ -157,6 +156,27 @@ def train(
         novelty_limit=float(np.quantile(novelty, selection.novelty_quantile)),
     )  # fmt: skip
     return motion_only(model, features[data.first_rows]) if group == GENERIC else model, curve
+
+
+def _judged(
+    group: str, data: TrainingSet, features: np.ndarray, places: np.ndarray, area_mm2: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Features (F, M') and Gram matrix (F, F) of what cross-validation judges by: layers, or motion.
+
+    Args:
+        group: kind of the regressor: the generic one is judged by the motion of the mask's corners alone.
+        data: the rows; features: (F, M') of them; places: (F, N * 3) displacements.
+        area_mm2: (T,) of the layers' triangles.
+    """
+    if group != GENERIC:
+        return features, target_gram(data.layers, np.repeat(area_mm2 / area_mm2.mean(), 9))
+    moving, moved = (about_own_mean(values, data.persons) for values in (features, places))
+    return moving, target_gram(moved)
+
+
+def about_own_mean(values: np.ndarray, persons: np.ndarray) -> np.ndarray:
+    """`values` (F, K) less the mean over the frames of each of `persons` (F,): what is motion."""
+    return values - (person_averages(persons) @ values)[persons]
 
 
 def motion_only(model: LipModel, neutral_features: np.ndarray) -> LipModel:
