@@ -108,7 +108,8 @@ def test_people_of_the_studio_make_a_regressor_that_holds_none_of_them(project):
     first = np.stack([load_first(project, name) for name in PEOPLE])
     layers = model.predict(first)
     assert np.abs(layers).max() > 1e-3
-    assert np.abs(layers.mean(axis=0)).max() < 1e-5
+    # But for the three digits that the file keeps of its basis.
+    assert np.abs(layers.mean(axis=0)).max() < 0.01 * np.abs(layers).max()
 
 
 def load_first(project, name):
