@@ -55,6 +55,8 @@ def plan(model, role="tattoo", last=11, seed=3, performance="generated", lights=
             "csv": None,
             "csv_first": 0,
             "csv_fps": 30.0,
+            "mirrored": False,
+            "gain": 1.0,
             "lights": lights,
         },
         "identity_spread": 0.7,

@@ -139,7 +139,7 @@ def test_frames_without_landmarks_are_flagged_and_interpolated(results, tmp_path
     assert np.linalg.norm(meshes[6] - whole[6], axis=-1).mean() < 12.0  # mm, of a quick motion
 
 
-CFG_EXTERNAL = {f"tracking.external.{key}": None for key in ("unit_mm", "up", "mesh")}
+CFG_EXTERNAL = {f"tracking.external.{key}": None for key in ("unit_mm", "up", "mesh", "flame")}
 
 
 def test_topology_and_sequences_of_other_trackers(results, tmp_path):
