@@ -224,6 +224,27 @@ def test_a_scan_without_a_face_is_said_so(generic, monkeypatch):
         find_landmarks(mesh, Blind(), generic.neutral_mm[generic.landmarks], "anna")
 
 
+def test_a_surer_face_of_another_shape_is_no_face(generic, monkeypatch):
+    """A small detector may be surer of a head on its side, and nothing of it is found from closer."""
+    truth, rng = generic.neutral_mm[generic.landmarks], np.random.default_rng(0)
+    elsewhere = rng.normal(0.0, 60.0, (66, 3))
+    scan = Mesh(generic.neutral_mm, generic.triangles)
+
+    def landmarks(views, camera, detector):
+        front, up = -camera.rotation[2], -camera.rotation[1]
+        if front[2] > 0.9 and up[1] > 0.5:
+            points, confidence = truth, 0.5
+        elif front[1] > 0.9 and up[0] < -0.9:
+            points, confidence = elsewhere, 0.7
+        else:
+            return Landmarks.none(), np.full((66, 3), np.nan)
+        return Landmarks(camera.project(points), np.full(66, confidence), True), points
+
+    monkeypatch.setattr("vermilion.scan.views.ScanViews.landmarks", landmarks)
+    found = find_landmarks(scan, None, truth)
+    np.testing.assert_allclose(found.points[17:], truth[17:], atol=1e-9)
+
+
 def test_a_scan_of_a_forehead_is_refused(generic):
     truth = generic.neutral_mm
     upper = truth[:, 1] > np.quantile(truth[:, 1], 0.85)

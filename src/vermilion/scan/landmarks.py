@@ -20,6 +20,7 @@ from vermilion.storage.tables import read_table, write_table
 
 INNER = np.arange(len(JAW), N_LANDMARKS)  # the jaw line is a silhouette: another one in each view
 LEAST_GIVEN = 6
+_LIKE_A_FACE_MM = 8.0
 _SIZE_PX = 480
 _YAWS_DEG, _PITCHES_DEG = (-20.0, -10.0, 0.0, 10.0, 20.0), (-10.0, 0.0, 10.0)
 
@@ -59,20 +60,20 @@ def find_landmarks(
         InputError: no face found.
     """
     views = ScanViews(scan)
-    points = _first_look(views, detector)
-    if points is None:
-        raise InputError(
-            "no face in 24 views of the scan",
-            "a head or face whose surface the landmark detector knows",
-            "Look at the scan in a viewer; cut off what hides the face, or give the landmarks by "
-            "hand (tracking.scan_landmarks).",
-            subject=subject,
-        )
-    for _ in range(2):  # the second time the views are where they should be
-        known = INNER[np.isfinite(points[INNER]).all(axis=1)]
-        head_from_scan = similarity_alignment(points[known], generic[known])
-        points, spread = _all_views(views, detector, points, head_from_scan)
-    return ScanLandmarks(points, spread)
+    for points in _first_looks(views, detector, generic):
+        for _ in range(2):  # the second time the views are where they should be
+            points, spread = _all_views(views, detector, points, _aligned(points, generic))
+            if _known(points).sum() < LEAST_GIVEN:
+                break
+        else:
+            return ScanLandmarks(points, spread)
+    raise InputError(
+        "no face in 24 views of the scan",
+        "a head or face whose surface the landmark detector knows",
+        "Look at the scan in a viewer; cut off what hides the face, or give the landmarks by "
+        "hand (tracking.scan_landmarks).",
+        subject=subject,
+    )
 
 
 def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmarks:
@@ -112,8 +113,14 @@ def write_landmarks(path: str | Path, landmarks: ScanLandmarks) -> None:
     write_table(path, pd.DataFrame({"landmark": numbers, "x": x, "y": y, "z": z}))
 
 
-def _first_look(views: ScanViews, detector: LandmarkDetector) -> np.ndarray | None:
-    """Points (66, 3) of the view with the surest face; None where no view has one."""
+def _first_looks(
+    views: ScanViews, detector: LandmarkDetector, generic: np.ndarray
+) -> list[np.ndarray]:
+    """Points (66, 3) of the views with a face, the one most like the model's face first.
+
+    A detector may be surer of a face that lies on its side than of the upright one, and its points then
+    have another shape; so what counts is how far they lie from `generic` (66, 3) mm after alignment.
+    """
     low, high = views.mesh.vertices_mm.min(axis=0), views.mesh.vertices_mm.max(axis=0)
     middle, size = (low + high) / 2, 1.1 * float((high - low).max())
     axes = np.concatenate([np.eye(3), -np.eye(3)])
@@ -122,19 +129,35 @@ def _first_look(views: ScanViews, detector: LandmarkDetector) -> np.ndarray | No
         ((f, u) for f, u in itertools.permutations(range(6), 2) if f % 3 != u % 3),
         key=lambda pair: pair != (2, 1),
     )
-    best, sure = None, 0.0
+    seen = []
     for front, up in pairs:
         camera = camera_towards(middle, size, axes[front], axes[up], _SIZE_PX)
         found, points = views.landmarks(camera, detector)
-        known = np.isfinite(points[INNER]).all(axis=1)
-        if not found.found or known.mean() < 0.8:
+        if not found.found or _known(points).mean() < 0.8:
             continue
-        confidence = float(found.confidence.mean())
-        if confidence > sure:
-            best, sure = points, confidence
-        if sure > 0.75:
+        away = _away_mm(points, generic)
+        seen.append((away, points))
+        if away < _LIKE_A_FACE_MM and found.confidence.mean() > 0.75:
             break
-    return best
+    return [points for _, points in sorted(seen, key=lambda entry: entry[0])]
+
+
+def _known(points: np.ndarray) -> np.ndarray:
+    """Which inner landmarks of points (66, 3) are known, bool."""
+    return np.isfinite(points[INNER]).all(axis=1)
+
+
+def _aligned(points: np.ndarray, generic: np.ndarray) -> Similarity:
+    """What takes the known inner landmarks of points (66, 3) to the model's (66, 3) mm."""
+    known = INNER[_known(points)]
+    return similarity_alignment(points[known], generic[known])
+
+
+def _away_mm(points: np.ndarray, generic: np.ndarray) -> float:
+    """Root mean square distance of the aligned inner landmarks from the model's, mm."""
+    known = INNER[_known(points)]
+    away = _aligned(points, generic).apply(points[known]) - generic[known]
+    return float(np.sqrt((away**2).sum(axis=1).mean()))
 
 
 def _all_views(
