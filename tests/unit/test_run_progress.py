@@ -1,7 +1,9 @@
 """The line of progress: stage, frames, frames a second, time left, and what failed."""
 
 import io
+import subprocess
 import sys
+import time
 
 from vermilion.app.run_progress import RunProgress
 from vermilion.app.workflow import ProgressLine, run_workflow
@@ -107,3 +109,21 @@ def test_snakemake_without_room_is_one_sentence(tmp_path):
     assert run_workflow([sys.executable, "-c", code], tmp_path / "s.log", stream=terminal) == 1
     assert "found that the disk is full" in terminal.getvalue()
     assert "Traceback" not in terminal.getvalue()
+
+
+def test_who_ends_the_command_ends_snakemake(tmp_path):
+    """SIGTERM to the command alone: what it started is told, and its exit code is the command's."""
+    child = "import signal, sys, time; signal.signal(15, lambda *_: sys.exit(7)); print('on', flush=True); time.sleep(60)"
+    code = (
+        "import sys; from pathlib import Path; from vermilion.app.workflow import run_workflow\n"
+        f"sys.exit(run_workflow([sys.executable, '-c', {child!r}], Path({str(tmp_path / 's.log')!r})))"
+    )
+    run = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+    for _ in range(600):
+        if (tmp_path / "s.log").is_file() and (tmp_path / "s.log").read_text() == "on\n":
+            break
+        time.sleep(0.05)
+    run.terminate()
+    _, said = run.communicate(timeout=30)
+    assert run.returncode == 7
+    assert "Asked to end" in said

@@ -6,12 +6,13 @@ import contextlib
 import errno
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -118,12 +119,13 @@ def _follow(
     ticker.start()
     try:
         assert process.stdout is not None  # a pipe
-        for line in process.stdout:
-            last.append(line)
-            kept = _keep(kept, line)
-            with lock:
-                state.feed(line, time.monotonic())
-        return process.wait(), list(last)
+        with _passed_on(process):
+            for line in process.stdout:
+                last.append(line)
+                kept = _keep(kept, line)
+                with lock:
+                    state.feed(line, time.monotonic())
+            return process.wait(), list(last)
     except KeyboardInterrupt:
         process.wait()  # the terminal has told Snakemake as well
         raise
@@ -133,6 +135,29 @@ def _follow(
         shown.clear()
         if kept is not None:
             kept.close()
+
+
+@contextlib.contextmanager
+def _passed_on(process: subprocess.Popen[str]) -> Iterator[None]:
+    """Pass on what asks this process to end: Snakemake would else go on with nobody to read what it prints.
+
+    A terminal's interrupt reaches both by itself; `kill`, a batch system or a closed session may reach this
+    process alone. Snakemake then starts no more jobs, and this process ends with it.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield  # signals come to the main thread, which is another's
+        return
+
+    def pass_on(number: int, _: object) -> None:
+        print("\nAsked to end: running jobs are awaited.", file=sys.stderr, flush=True)
+        process.send_signal(number)
+
+    before = {n: signal.signal(n, pass_on) for n in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _keep(log: IO[str] | None, line: str) -> IO[str] | None:
