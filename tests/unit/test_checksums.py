@@ -225,7 +225,7 @@ def test_a_file_that_no_job_wrote_is_named_and_left(recorded, capsys):
     dated(results / "folder" / "3.png", -500)
     assert [item.path.name for item in record(results, outputs, ends.get)] == ["3.png"]
     assert foreign_files(results) == [results / "folder" / "3.png"]
-    main([str(results)])
+    assert main([str(results)]) == 1
     printed = capsys.readouterr().out
     assert "foreign" in printed and "3.png" in printed and "0 damaged" in printed
     assert (results / "folder" / "3.png").is_file()
@@ -235,7 +235,7 @@ def test_a_result_that_is_gone_as_a_whole_is_said(recorded, capsys):
     results, _, _ = recorded
     (results / "a.npy").unlink()
     assert find_damage(results) == [] and removed_outputs(results) == [results / "a.npy"]
-    main([str(results)])
+    assert main([str(results)]) == 0  # somebody removed it: no damage
     assert "1 result(s) were removed as a whole" in capsys.readouterr().out
 
 

@@ -1,5 +1,8 @@
 """What a job may use: memory and time that grow with its frames and with each attempt."""
 
+import functools
+
+from vermilion.app.frame_megapixels import frame_megapixels
 from vermilion.app.orphaned_jobs import cancel_jobs, jobs_of_run, name_for
 from vermilion.app.partition_limits import impossible_jobs, read_partitions, requests_of
 from vermilion.app.unanswered_checks import keep_unanswered, without_names
@@ -8,17 +11,27 @@ from vermilion.app.unanswered_checks import keep_unanswered, without_names
 SLURM_NAME = name_for(R)
 
 
-def growing(least, for_each_frame=0.0):
+def growing(least, for_each_frame=0.0, for_each_megapixel=0.0, for_all_megapixels=0.0):
     """Memory (MB) or time (minutes) of a rule's jobs, doubled at each attempt after the first.
 
     Args:
-        least: what a job asks for, however few its frames.
+        least: what a job asks for, however few its frames and however small its images.
         for_each_frame: so much more for each frame of its chunk, or else of its take.
+        for_each_megapixel: so much more for each megapixel of one frame, all cameras of its take together.
+        for_all_megapixels: so much more for each megapixel of all its frames.
     """
 
     def amount(wildcards, attempt):
-        frames = frames_of_job(wildcards) if for_each_frame else 0
-        return int(least + for_each_frame * frames) * 2 ** (attempt - 1)
+        asked = least
+        if for_each_frame or for_all_megapixels:
+            frames = frames_of_job(wildcards)
+            asked += for_each_frame * frames
+        if for_each_megapixel or for_all_megapixels:
+            megapixels = megapixels_of_job(wildcards)
+            asked += for_each_megapixel * megapixels
+        if for_all_megapixels:
+            asked += for_all_megapixels * frames * megapixels
+        return int(asked) * 2 ** (attempt - 1)
 
     return amount
 
@@ -28,6 +41,20 @@ def frames_of_job(wildcards):
     if "chunk" in wildcards.keys():
         return len(frames_in(wildcards.chunk))
     return len(take_of(wildcards).frames)
+
+
+def megapixels_of_job(wildcards):
+    """Megapixels of a frame of its take; of a subject's largest take where the job is the subject's."""
+    if "take" in wildcards.keys():
+        return _megapixels(take_of(wildcards))
+    if "subject" in wildcards.keys():
+        return max(map(_megapixels, takes(subject=wildcards.subject)), default=0.0)
+    return max(map(_megapixels, TAKES), default=0.0)
+
+
+@functools.cache
+def _megapixels(take):
+    return frame_megapixels(take, CONFIG.studio, CONFIG.capture.reading)
 
 
 def on_slurm():

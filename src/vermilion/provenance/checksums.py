@@ -212,7 +212,7 @@ def _files_of(output: Path) -> Iterator[Path]:
 
 
 def main(arguments: list[str]) -> int:
-    """`python -m vermilion.provenance.checksums RESULTS`: name and remove damaged files."""
+    """`python -m vermilion.provenance.checksums RESULTS`: name and remove damaged files; 1 where there are any."""
     results = Path(arguments[0])
     if not (results / LEDGER).is_file():
         print(f"{results / LEDGER}: no checksums recorded yet; run the workflow first")
@@ -220,7 +220,8 @@ def main(arguments: list[str]) -> int:
     damage = find_damage(results)
     for item in damage:
         print(f"damaged: {item.path} ({item.reason})")
-    for path in foreign_files(results):
+    foreign = foreign_files(results)
+    for path in foreign:
         print(f"foreign: {path} (no job wrote it: move it away, a job may read the whole folder)")
     gone = removed_outputs(results)
     if gone:
@@ -234,7 +235,7 @@ def main(arguments: list[str]) -> int:
         f"{len(damage)} damaged file(s) in {results}"
         + ("; run the workflow again to repair them" if damage else "")
     )
-    return 0
+    return 1 if damage or foreign else 0
 
 
 if __name__ == "__main__":
