@@ -93,8 +93,8 @@ rule capture:
     benchmark:
         P.benchmark("capture", "chunk")
     resources:
-        mem_mb=growing(800),
-        runtime=growing(60),
+        mem_mb=growing(800, for_rig=25),
+        runtime=growing(60, for_rig_frames=0.005),
     params:
         cfg=cfg_of("capture.manifest"),
         code=code_of("capture/capture"),
@@ -121,8 +121,8 @@ rule cameras:
     benchmark:
         P.benchmark("cameras", "take")
     resources:
-        mem_mb=growing(1500),
-        runtime=growing(60),
+        mem_mb=growing(1500, for_rig=90),
+        runtime=growing(60, for_rig=0.3),
     params:
         cfg=cfg_of("capture.calibration", "capture.refinement"),
         code=code_of("capture/cameras"),

@@ -151,7 +151,7 @@ rule landmarks_faces:
     benchmark:
         P.benchmark("landmarks_faces", "chunk")
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(1000, for_mono=60),
         runtime=growing(60),
     params:
         cfg=detector_cfg("landmarks.files"),
@@ -285,8 +285,8 @@ rule landmarks_views:
     benchmark:
         P.benchmark("landmarks_views", "take")
     resources:
-        mem_mb=growing(1000),
-        runtime=growing(30),
+        mem_mb=growing(1000, for_rig=25),
+        runtime=growing(30, for_rig_frames=0.003),
     params:
         cfg=detector_cfg("landmarks.files"),
         code=code_of("landmarks/landmarks_views"),

@@ -90,8 +90,8 @@ rule multiview_neutral:
     benchmark:
         P.benchmark("multiview_neutral", "take")
     resources:
-        mem_mb=growing(1500),
-        runtime=growing(30),
+        mem_mb=growing(1500, for_rig=30),
+        runtime=growing(30, for_rig=0.1),
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.neutral"),
         code=code_of("multiview/multiview_neutral"),
@@ -116,7 +116,7 @@ rule multiview_anchor:
     benchmark:
         P.benchmark("multiview_anchor", "clip")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_rig=30),
         runtime=growing(30),
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
@@ -143,8 +143,8 @@ rule multiview_clip:
     benchmark:
         P.benchmark("multiview_clip", "clip")
     resources:
-        mem_mb=growing(1500),
-        runtime=growing(60),
+        mem_mb=growing(1500, for_rig=30),
+        runtime=growing(60, for_rig_frames=0.005),
     params:
         cfg=cfg_of("multiview.images", "multiview.track"),
         code=code_of("multiview/multiview_clip"),
@@ -196,8 +196,8 @@ rule multiview_refine:
     benchmark:
         P.benchmark("multiview_refine", "chunk")
     resources:
-        mem_mb=growing(1500),
-        runtime=growing(60),
+        mem_mb=growing(1500, for_rig=75),
+        runtime=growing(60, for_rig_frames=0.02),
     params:
         cfg=cfg_of("multiview.images", "multiview.stereo", "multiview.refine"),
         code=code_of("multiview/multiview_refine"),
@@ -224,8 +224,8 @@ rule multiview_drift:
     benchmark:
         P.benchmark("multiview_drift", "chunk")
     resources:
-        mem_mb=growing(1500),
-        runtime=growing(30),
+        mem_mb=growing(1500, for_rig=30),
+        runtime=growing(30, for_rig_frames=0.003),
     params:
         cfg=cfg_of("multiview.images", "multiview.drift"),
         code=code_of("multiview/multiview_drift"),
@@ -266,7 +266,7 @@ rule multiview_report:
     benchmark:
         P.benchmark("multiview_report", "take")
     resources:
-        mem_mb=growing(2000),
+        mem_mb=growing(2000, for_rig=50),
         runtime=growing(30),
     params:
         cfg=cfg_of(

@@ -11,26 +11,27 @@ from vermilion.app.unanswered_checks import keep_unanswered, without_names
 SLURM_NAME = name_for(R)
 
 
-def growing(least, for_each_frame=0.0, for_each_megapixel=0.0, for_all_megapixels=0.0):
+def growing(least, for_each_frame=0.0, for_rig=0.0, for_mono=0.0, for_rig_frames=0.0):
     """Memory (MB) or time (minutes) of a rule's jobs, doubled at each attempt after the first.
 
     Args:
         least: what a job asks for, however few its frames and however small its images.
         for_each_frame: so much more for each frame of its chunk, or else of its take.
-        for_each_megapixel: so much more for each megapixel of one frame, all cameras of its take together.
-        for_all_megapixels: so much more for each megapixel of all its frames.
+        for_rig: so much more for each megapixel of one frame, all cameras of its take together.
+        for_mono: so much more for each megapixel of its take's largest image.
+        for_rig_frames: as `for_rig`, times its frames.
     """
 
     def amount(wildcards, attempt):
         asked = least
-        if for_each_frame or for_all_megapixels:
-            frames = frames_of_job(wildcards)
-            asked += for_each_frame * frames
-        if for_each_megapixel or for_all_megapixels:
-            megapixels = megapixels_of_job(wildcards)
-            asked += for_each_megapixel * megapixels
-        if for_all_megapixels:
-            asked += for_all_megapixels * frames * megapixels
+        if for_each_frame:
+            asked += for_each_frame * frames_of_job(wildcards)
+        if for_rig:
+            asked += for_rig * sum(megapixels_of_job(wildcards))
+        if for_mono:
+            asked += for_mono * max(megapixels_of_job(wildcards), default=0.0)
+        if for_rig_frames:
+            asked += for_rig_frames * frames_of_job(wildcards) * sum(megapixels_of_job(wildcards))
         return int(asked) * 2 ** (attempt - 1)
 
     return amount
@@ -44,16 +45,15 @@ def frames_of_job(wildcards):
 
 
 def megapixels_of_job(wildcards):
-    """Megapixels of a frame of its take; of a subject's largest take where the job is the subject's."""
+    """Megapixels of each camera's image, of its take; of the largest take of a job of several."""
     if "take" in wildcards.keys():
-        return _megapixels(take_of(wildcards))
-    if "subject" in wildcards.keys():
-        return max(map(_megapixels, takes(subject=wildcards.subject)), default=0.0)
-    return max(map(_megapixels, TAKES), default=0.0)
+        return megapixels_of(take_of(wildcards))
+    subject = wildcards.subject if "subject" in wildcards.keys() else None
+    return max(map(megapixels_of, takes(subject=subject)), key=sum, default=[])
 
 
 @functools.cache
-def _megapixels(take):
+def megapixels_of(take):
     return frame_megapixels(take, CONFIG.studio, CONFIG.capture.reading)
 
 

@@ -161,7 +161,7 @@ for take in [take for take in TAKES if take.source == STUDIO]:
         benchmark:
             fill(P.benchmark("studio_rig", "take"), take)
         resources:
-            mem_mb=growing(1500 + len(take.frames)),
+            mem_mb=growing(1500 + len(take.frames) + 140 * sum(megapixels_of(take))),
             runtime=growing(30),
         params:
             cfg={
@@ -192,8 +192,8 @@ for take in [take for take in TAKES if take.source == STUDIO]:
             benchmark:
                 fill(P.benchmark("studio_take", "chunk"), take, chunk=chunk)
             resources:
-                mem_mb=growing(1500),
-                runtime=growing(5 + len(frames_in(chunk))),
+                mem_mb=growing(1500 + 140 * sum(megapixels_of(take))),
+                runtime=growing(5 + len(frames_in(chunk)) * (1 + sum(megapixels_of(take)) / 10)),
             params:
                 cfg={
                     "plan": studio_plan(take),

@@ -14,21 +14,23 @@ from vermilion.storage.errors import VermilionError
 from vermilion.studio.rig import FACE_ANGLES_DEG, LIP_ANGLES_DEG, VIDEO_CAMERAS, camera_names
 
 
-def frame_megapixels(take: Take, studio: StudioConfig, reading: ImageReading = AS_TAGGED) -> float:
-    """Megapixels of one frame, all cameras of the take together.
+def frame_megapixels(
+    take: Take, studio: StudioConfig, reading: ImageReading = AS_TAGGED
+) -> list[float]:
+    """Megapixels of one frame, of each camera of the take.
 
-    Zero where no header can be read, which other checks name; and for meshes of another tracker.
+    None where no header can be read, which other checks name; and for meshes of another tracker.
     """
     if take.role == "tracked":
-        return 0.0
+        return []
     if take.source == STUDIO:
         sizes = _studio_sizes(take.role, studio)
     else:
         try:
             sizes = _sizes(Path(take.source), reading)
         except (VermilionError, OSError):
-            return 0.0
-    return sum(width * height for width, height in sizes) / 1e6
+            return []
+    return [width * height / 1e6 for width, height in sizes]
 
 
 def _studio_sizes(role: str, studio: StudioConfig) -> list[tuple[int, int]]:
