@@ -32,7 +32,6 @@ from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
-from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
 from vermilion.evaluation.contour_error import distance_to_polyline
@@ -44,6 +43,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_taken
 from vermilion.studio.labels import lip_contours
 from vermilion.studio.surface import surface_of
 from vermilion.tracking.result import TrackedTake
@@ -166,7 +166,7 @@ def detectors_of(scene: Scene, rings: dict[int, Rings]) -> dict[str, ContourDete
         cfg = ContourDetectorConfig()
         near_track = learn_from_take(
             TrackRidgeDetector(),
-            sorted(evenly(np.flatnonzero(scene.track.valid).tolist(), cfg.track.frames)),
+            sorted(evenly_taken(np.flatnonzero(scene.track.valid).tolist(), cfg.track.frames)),
             lambda frame: scene.images.read(scene.camera.name, frame),
             scene.track.points_px.__getitem__,
             rings.__getitem__,

@@ -43,7 +43,7 @@ def shape_on(model) -> np.ndarray:
     shape = model.neutral_mm[rng.choice(face, entry.n_points)]
     for name, loop in (("inner", model.inner_contour), ("outer", model.outer_contour)):
         upper, lower = contour_halves(model.neutral_mm, model.landmarks, loop)
-        for lip, path in (("upper", upper), ("lower", lower[::-1])):
+        for lip, path in (("upper", upper), ("lower", lower)):
             line = entry.lip_line(lip, name)
             share = np.linspace(0.05 * (name == "inner"), 1 - 0.05 * (name == "inner"), len(line))
             rows = share * (len(path) - 1)
@@ -137,7 +137,7 @@ def test_irises_have_no_place_and_infinite_deviation(model, places):
 def test_places_of_the_rings_follow_each_other_along_the_models_contour(model, places, lip, name):
     loop = model.outer_contour if name == "outer" else model.inner_contour
     upper, lower = contour_halves(model.neutral_mm, model.landmarks, loop)
-    path = upper if lip == "upper" else lower[::-1]
+    path = upper if lip == "upper" else lower
     points = places.of(model.neutral_mm)[MEDIAPIPE478.lip_line(lip, name)]
     start, end = model.neutral_mm[path[:-1]], model.neutral_mm[path[1:]]
     share = np.linspace(0, 1, 20)[None, :, None]

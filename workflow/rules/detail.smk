@@ -6,6 +6,22 @@ from C. No other stage reads them. Relief is of each frame alone; a second rule 
 over a window of frames, which reaches into the neighbouring chunks.
 """
 
+#: What the fine meshes and their images depend on.
+RELIEF_SCENE = [f"detail.relief.{key}" for key in ("levels", "spacing_mm", "face_px")]
+#: Priors of the relief and noise of the image: `ReliefSettings`.
+RELIEF_PRIORS = [
+    f"detail.relief.{key}"
+    for key in (
+        "detail_mm",
+        "curvature_sigma",
+        "displacement_sigma_mm",
+        "standing_share",
+        "noise_floor",
+        "misplaced_mm",
+        "iterations",
+    )
+]
+
 
 def detail_takes():
     """Rows of the takes that are refined, in the order of the configuration."""
@@ -102,19 +118,7 @@ rule relief_start:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        cfg=cfg_of(
-            "detail.relief.levels",
-            "detail.relief.spacing_mm",
-            "detail.relief.face_px",
-            "detail.relief.light_frames",
-            "detail.relief.detail_mm",
-            "detail.relief.curvature_sigma",
-            "detail.relief.displacement_sigma_mm",
-            "detail.relief.standing_share",
-            "detail.relief.noise_floor",
-            "detail.relief.misplaced_mm",
-            "detail.relief.iterations",
-        ),
+        cfg=cfg_of(*RELIEF_SCENE, *RELIEF_PRIORS, "detail.relief.light_frames"),
         code=code_of("detail/relief_start"),
         source=mono_source,
         span=take_span,
@@ -140,18 +144,7 @@ rule relief_evidence:
         mem_mb=growing(2000),
         runtime=growing(60),
     params:
-        cfg=cfg_of(
-            "detail.relief.levels",
-            "detail.relief.spacing_mm",
-            "detail.relief.face_px",
-            "detail.relief.detail_mm",
-            "detail.relief.curvature_sigma",
-            "detail.relief.displacement_sigma_mm",
-            "detail.relief.standing_share",
-            "detail.relief.noise_floor",
-            "detail.relief.misplaced_mm",
-            "detail.relief.iterations",
-        ),
+        cfg=cfg_of(*RELIEF_SCENE, *RELIEF_PRIORS),
         code=code_of("detail/relief_evidence"),
         source=mono_source,
         frames=chunk_frames,
@@ -178,18 +171,7 @@ rule relief_light:
         mem_mb=growing(2000),
         runtime=growing(30),
     params:
-        cfg=cfg_of(
-            "detail.relief.levels",
-            "detail.relief.spacing_mm",
-            "detail.relief.face_px",
-            "detail.relief.detail_mm",
-            "detail.relief.curvature_sigma",
-            "detail.relief.displacement_sigma_mm",
-            "detail.relief.standing_share",
-            "detail.relief.noise_floor",
-            "detail.relief.misplaced_mm",
-            "detail.relief.iterations",
-        ),
+        cfg=cfg_of(*RELIEF_SCENE, *RELIEF_PRIORS),
         code=code_of("detail/relief_light"),
         source=mono_source,
         span=take_span,
@@ -215,18 +197,7 @@ rule relief:
         mem_mb=growing(2000),
         runtime=growing(60),
     params:
-        cfg=cfg_of(
-            "detail.relief.levels",
-            "detail.relief.spacing_mm",
-            "detail.relief.face_px",
-            "detail.relief.detail_mm",
-            "detail.relief.curvature_sigma",
-            "detail.relief.displacement_sigma_mm",
-            "detail.relief.standing_share",
-            "detail.relief.noise_floor",
-            "detail.relief.misplaced_mm",
-            "detail.relief.iterations",
-        ),
+        cfg=cfg_of(*RELIEF_SCENE, *RELIEF_PRIORS),
         code=code_of("detail/relief"),
         source=mono_source,
         frames=chunk_frames,
@@ -260,9 +231,7 @@ rule relief_meshes:
         runtime=growing(60),
     params:
         cfg=cfg_of(
-            "detail.relief.levels",
-            "detail.relief.spacing_mm",
-            "detail.relief.face_px",
+            *RELIEF_SCENE,
             "detail.relief.window",
             "detail.relief.position_weight",
             "detail.relief.map_px",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import adjacency, boundary_edges, triangle_areas
+from vermilion.geometry.mesh import adjacency, boundary_edges, connected_parts, triangle_areas
 from vermilion.geometry.surface_points import SurfacePoints
 
 
@@ -42,9 +41,7 @@ def _longest_border(model: FaceModel) -> np.ndarray:
     edges = boundary_edges(model.triangles)
     if len(edges) == 0:
         return np.zeros(0, dtype=int)
-    n = model.n_vertices
-    graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    part = connected_parts(edges, model.n_vertices)
     lengths = np.linalg.norm(model.neutral_mm[edges[:, 0]] - model.neutral_mm[edges[:, 1]], axis=1)
     longest = np.bincount(part[edges[:, 0]], weights=lengths).argmax()
     return np.unique(edges[part[edges[:, 0]] == longest])

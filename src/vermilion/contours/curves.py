@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from vermilion.geometry.polylines import lengths_along
 from vermilion.imaging.sampling import sample_bilinear
 
 #: Points of a curve through a loop.
@@ -23,8 +24,7 @@ def loop_spline(loop_px: np.ndarray, n_points: int = CURVE_POINTS) -> np.ndarray
     half = int(np.argmax(np.linalg.norm(loop_px - loop_px[0], axis=1)))
     halves = []
     for part in (loop_px[: half + 1], np.concatenate([loop_px[half:], loop_px[:1]])):
-        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
-        along += np.arange(len(along)) * 1e-6  # landmarks may coincide
+        along = lengths_along(part) + np.arange(len(part)) * 1e-6  # landmarks may coincide
         places = np.linspace(0, along[-1], n_points // 2, endpoint=False)
         halves.append(CubicSpline(along, part)(places))
     return np.concatenate(halves)

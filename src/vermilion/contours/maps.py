@@ -9,12 +9,11 @@ import numpy as np
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.labels import ContourLabel
 from vermilion.contours.region import mouth_region, usable
-from vermilion.imaging.draw import draw_points, draw_polyline, label, tile, to_display
+from vermilion.imaging.draw import draw_points, draw_polyline, label, to_display
 from vermilion.imaging.frames import FrameSource
 from vermilion.imaging.images import read_channels, write_channels
 from vermilion.landmarks.scheme import interocular_px
 from vermilion.storage.errors import InputError
-from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.quality import QualityRow
 
 INNER_COLOUR, OUTER_COLOUR = (255, 70, 60), (70, 255, 90)
@@ -109,15 +108,3 @@ def maps_overlay(
                 mixed, region.to_region(line.points_px), LABEL_COLOUR, line.closed
             )
     return label(np.hstack([crop, mixed]), f"frame {frame}")
-
-
-def sheet(images: list[np.ndarray], columns: int = 3) -> np.ndarray:
-    """A contact sheet (H, W, 3) uint8 of `images` (h, w, 3); a grey field where there are none."""
-    if not images:
-        return np.full((64, 256, 3), 90, dtype=np.uint8)
-    return tile(images, columns)
-
-
-def evenly(frames: list[int], count: int) -> set[int]:
-    """At most `count` of the frames, evenly taken, the first and the last among them."""
-    return {frames[i] for i in evenly_spaced(len(frames), count)}

@@ -15,10 +15,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
-from vermilion.geometry.mesh import adjacency, unique_edges
+from vermilion.faces.contours import edge_graph, geodesic_distance
+from vermilion.geometry.mesh import adjacency, connected_parts, unique_edges
 from vermilion.storage.errors import InputError
 
 #: How stiff a follower's triangle is beside one of the mask.
@@ -67,7 +66,8 @@ def integration_domain(
 
     others = np.setdiff1d(np.arange(len(triangles)), mask)
     if seam_mm > 0:
-        far = _distance_from(vertices_mm, triangles, in_mask | followers)
+        graph = edge_graph(vertices_mm, triangles)
+        far = geodesic_distance(graph, np.flatnonzero(in_mask | followers))
         free = in_mask | followers | (far < seam_mm)
         fraction = np.clip(np.where(np.isfinite(far), far, 0.0) / seam_mm, 0.0, 0.999)
         hold = np.where(outside, fraction**2 / (1.0 - fraction) ** 2, 0.0)
@@ -99,10 +99,7 @@ def _followers(vertices_mm: np.ndarray, triangles: np.ndarray, in_mask: np.ndarr
     n_vertices = len(vertices_mm)
     edges = unique_edges(triangles)
     outer = edges[~in_mask[edges].any(axis=1)]
-    graph = sparse.csr_matrix(
-        (np.ones(len(outer)), (outer[:, 0], outer[:, 1])), shape=(n_vertices, n_vertices)
-    )
-    _, part = csgraph.connected_components(graph, directed=False)
+    part = connected_parts(outer, n_vertices)
     centre = vertices_mm[in_mask].mean(axis=0)
     distance = np.linalg.norm(vertices_mm - centre, axis=1)
     mean_distance = np.bincount(part, distance) / np.bincount(part)
@@ -112,11 +109,3 @@ def _followers(vertices_mm: np.ndarray, triangles: np.ndarray, in_mask: np.ndarr
     touched = np.zeros(len(inside), dtype=bool)
     touched[part[crossing[~in_mask[crossing]]]] = True
     return (inside & touched)[part] & ~in_mask
-
-
-def _distance_from(vertices_mm: np.ndarray, triangles: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Distance along the edges to the nearest vertex of `start` (V,) bool, (V,) mm."""
-    edges = unique_edges(triangles)
-    lengths = np.linalg.norm(vertices_mm[edges[:, 0]] - vertices_mm[edges[:, 1]], axis=1)
-    graph = sparse.csr_matrix((lengths, (edges[:, 0], edges[:, 1])), shape=(len(vertices_mm),) * 2)
-    return csgraph.dijkstra(graph, directed=False, indices=np.flatnonzero(start), min_only=True)

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from vermilion.correspondence.binding import bind_vertices, flipped_triangles
 from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import Mesh, triangle_normals
+from vermilion.geometry.mesh import Mesh, connected_parts, triangle_normals, unique_edges
 from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.storage.arrays import format_version, read_arrays, write_arrays
@@ -275,9 +273,5 @@ def mouth_mask(
             "matched"
         )
     corners = triangles[inside]
-    rows, columns = corners[:, [0, 1, 2]].ravel(), corners[:, [1, 2, 0]].ravel()
-    shape = (len(vertices),) * 2
-    graph = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=shape)
-    _, part = csgraph.connected_components(graph, directed=False)
-    part = part[corners[:, 0]]
+    part = connected_parts(unique_edges(corners), len(vertices))[corners[:, 0]]
     return inside[part == np.bincount(part).argmax()].astype(np.int32)

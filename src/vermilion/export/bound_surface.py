@@ -176,7 +176,7 @@ def _lip_pairs(
         triangle_sides(labels.triangles, own),
     )
     theirs, ours = [], []
-    for side, half in zip((1, -1), (halves[0], halves[1][::-1]), strict=True):
+    for side, half in zip((1, -1), halves, strict=True):
         place = _along(driver.neutral_mm, half, shares)
         theirs.append(place)
         points = place @ driver.neutral_mm

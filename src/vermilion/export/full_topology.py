@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from vermilion.correspondence.models import bind_models, models_apart, shape_of
 from vermilion.export.animation import Animation, NamedShapes
 from vermilion.export.shape_basis import ShapeBasis
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.mesh import connected_parts, unique_edges
 from vermilion.geometry.polygons import Polygons
 from vermilion.geometry.surface_points import SurfacePoints
 
@@ -122,8 +121,7 @@ def _carry(
     pose: np.ndarray, full: FaceModel, coarse: np.ndarray, triangles: np.ndarray
 ) -> sparse.csr_matrix:
     """(W, V): nearest points of the coarser surface, for the skin, fading out beyond its border."""
-    graph = adjacency(full.triangles, full.n_vertices)
-    part = connected_components(graph, directed=False)[1]
+    part = connected_parts(unique_edges(full.triangles), full.n_vertices)
     skin = np.isin(part, np.unique(part[full.landmarks]))
     skin &= ~full.regions["teeth"] & ~full.regions["eyes"]
     found = Surface(coarse, triangles).closest(pose)

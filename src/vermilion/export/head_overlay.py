@@ -13,14 +13,13 @@ from vermilion.geometry.camera import Camera, portrait_camera
 from vermilion.geometry.closest_points import Surface
 from vermilion.imaging.draw import (
     colour_map,
-    draw_mesh,
     draw_points,
     draw_polyline,
-    label,
+    portrait,
     tile,
 )
 
-_SIZE_PX, _GROUND, _SCALE_MM = 420, 40, 1.0
+_SIZE_PX, _SCALE_MM = 420, 1.0
 _EXPRESSIONS = ("jawOpen", "mouthPucker", "mouthSmile_L")
 
 
@@ -36,12 +35,12 @@ def head_overlay(generic: FaceModel, head: HeadFile, binding: HeadBinding) -> np
     colours = colour_map(np.where(face, near.distance_mm, np.nan), 0.0, _SCALE_MM)
     camera = portrait_camera(binding.registered_mm, _SIZE_PX)
     mouth = _mouth_camera(labels)
-    shown = _portrait(camera, labels.neutral_mm, labels.triangles, "head, landmarks")
+    shown = portrait(camera, labels.neutral_mm, labels.triangles, "head, landmarks")
     shown = draw_points(
         shown, camera.project(labels.neutral_mm[labels.landmarks]), (60, 160, 255), 2
     )
     title = f"distance, 0 to {_SCALE_MM:g} mm; grey: no face"
-    lips = _portrait(mouth, labels.neutral_mm, labels.triangles, "contours of the lips")
+    lips = portrait(mouth, labels.neutral_mm, labels.triangles, "contours of the lips")
     for loop, colour in (
         (labels.outer_contour, (255, 40, 40)),
         (labels.inner_contour, (40, 255, 40)),
@@ -50,8 +49,8 @@ def head_overlay(generic: FaceModel, head: HeadFile, binding: HeadBinding) -> np
         lips = draw_polyline(lips, mouth.project(closed), colour)
     panels = [
         shown,
-        _portrait(camera, binding.registered_mm, generic.triangles, "our mesh over it"),
-        _portrait(camera, labels.neutral_mm, labels.triangles, title, colours),
+        portrait(camera, binding.registered_mm, generic.triangles, "our mesh over it"),
+        portrait(camera, labels.neutral_mm, labels.triangles, title, colours),
         lips,
         *_expressions(generic, head, binding, camera, mouth),
     ]
@@ -70,7 +69,7 @@ def _expressions(
         on = np.array([float(shape == name) for shape in generic.expression_names])
         pose = transfer.pose(generic.vertices(None, on), on)
         title = name or "our neutral"
-        panels.append(_portrait(seen, pose, triangles, title))
+        panels.append(portrait(seen, pose, triangles, title))
     return panels
 
 
@@ -78,14 +77,3 @@ def _mouth_camera(labels: FaceModel) -> Camera:
     lips = labels.neutral_mm[labels.outer_contour]
     middle, reach = lips.mean(axis=0), np.ptp(lips, axis=0).max()
     return portrait_camera(middle + 0.7 * reach * np.array([[-1.0, -1, 0], [1, 1, 0]]), _SIZE_PX)
-
-
-def _portrait(
-    camera: Camera,
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    title: str,
-    colours: np.ndarray | None = None,
-) -> np.ndarray:
-    empty = np.full((_SIZE_PX, _SIZE_PX, 3), _GROUND, dtype=np.uint8)
-    return label(draw_mesh(empty, camera, vertices, triangles, colours), title)

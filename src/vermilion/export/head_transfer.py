@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from vermilion.export.animation import Animation, NamedShapes
 from vermilion.export.bound_surface import BoundSurface
@@ -20,7 +19,7 @@ from vermilion.export.head_file import HeadFile
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import Similarity, similarity_alignment
 from vermilion.geometry.closest_points import Surface
-from vermilion.geometry.mesh import adjacency
+from vermilion.geometry.mesh import connected_parts, unique_edges
 from vermilion.landmarks.scheme import JAW
 from vermilion.scan.transfer import DeformationTransfer
 
@@ -187,8 +186,7 @@ def _parts(labels: FaceModel, driver: FaceModel) -> tuple[np.ndarray, np.ndarray
 
 
 def _loose(labels: FaceModel, driver: FaceModel) -> list[_Part]:
-    graph = adjacency(labels.triangles, labels.n_vertices)
-    number = connected_components(graph, directed=False)[1]
+    number = connected_parts(unique_edges(labels.triangles), labels.n_vertices)
     skin = int(np.bincount(number[labels.landmarks]).argmax())
     away = Surface(driver.neutral_mm, driver.triangles).closest(labels.neutral_mm).distance_mm
     assert away is not None

@@ -57,16 +57,8 @@ class Crop:
         model = camera.colmap()
         params = np.array(camera.params, dtype=float)
         params[list(model.principal_point_idxs())] -= (self.left, self.top)
-        cropped = replace(
-            camera, params=tuple(params), width_px=self.width, height_px=self.height
-        ).colmap()
-        cropped.rescale(*self.size)
-        return replace(
-            camera,
-            params=tuple(cropped.params),
-            width_px=cropped.width,
-            height_px=cropped.height,
-        )
+        cropped = replace(camera, params=tuple(params), width_px=self.width, height_px=self.height)
+        return cropped.resized_to(*self.size)
 
 
 def crop_round(

@@ -19,6 +19,7 @@ from vermilion.faces.contours import (
 )
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh, vertex_normals
+from vermilion.geometry.polylines import evenly_along
 
 #: Points of a half of the model's contour, to which the path keeps.
 _DENSE = 200
@@ -66,7 +67,7 @@ def lip_loops(model: FaceModel, registered: Mesh, mesh: Mesh) -> LipLoops:
         for c in (RIGHT_CORNER, LEFT_CORNER)
     ]
     everywhere = np.ones(len(mesh.vertices_mm), dtype=bool)
-    halves = _halves(model, model.outer_contour)
+    halves = contour_halves(model.neutral_mm, model.landmarks, model.outer_contour)
     above, below = (_half(mesh, registered, h, corners, everywhere, graph) for h in halves)
     outer = without_spurs(np.concatenate([above[:-1], below[::-1][:-1]]))
     to_upper, to_lower = (
@@ -74,7 +75,7 @@ def lip_loops(model: FaceModel, registered: Mesh, mesh: Mesh) -> LipLoops:
         geodesic_distance(graph, below[1:-1]),
     )
     upper, lower = to_upper < to_lower, to_lower < to_upper
-    halves = _halves(model, model.inner_contour)
+    halves = contour_halves(model.neutral_mm, model.landmarks, model.inner_contour)
     above, below = (
         _half(mesh, registered, half, corners, side, graph)
         for half, side in zip(halves, (upper, lower), strict=True)
@@ -83,17 +84,11 @@ def lip_loops(model: FaceModel, registered: Mesh, mesh: Mesh) -> LipLoops:
     if min(len(outer), len(inner)) < 6:
         raise ValueError(f"contours of {len(outer)} and {len(inner)} vertices")
     for loop, name in ((outer, model.outer_contour), (inner, model.inner_contour)):
-        line = _evenly(registered.vertices_mm[np.append(name, name[0])], 2 * _DENSE)
+        line = evenly_along(registered.vertices_mm[np.append(name, name[0])], 2 * _DENSE)
         off = float(cKDTree(line).query(mesh.vertices_mm[loop])[0].mean())
         if off > _OFF_MM:
             raise ValueError(f"the nearest lie {off:.1f} mm off")
     return LipLoops(outer, inner, upper, lower)
-
-
-def _halves(model: FaceModel, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Upper and lower vertex path of a contour, both from the right corner to the left."""
-    above, below = contour_halves(model.neutral_mm, model.landmarks, loop)
-    return above, below[::-1]
 
 
 def _half(
@@ -105,7 +100,7 @@ def _half(
     graph: sparse.csr_matrix,
 ) -> np.ndarray:
     """Vertices of the mesh along a half (n,) of a contour, from corner to corner, on one side alone."""
-    line = _evenly(registered.vertices_mm[half], _DENSE)
+    line = evenly_along(registered.vertices_mm[half], _DENSE)
     distance, _ = cKDTree(line).query(mesh.vertices_mm)
     allowed = side.copy()
     allowed[corners] = True
@@ -127,10 +122,3 @@ def _nearest(
     distance = np.linalg.norm(mesh.vertices_mm[None] - registered.vertices_mm[ids][:, None], axis=2)
     distance = distance + _TURNED_MM * (1.0 - wanted @ normals.T)
     return np.where(allowed, distance, np.inf).argmin(axis=1).tolist()
-
-
-def _evenly(points: np.ndarray, count: int) -> np.ndarray:
-    """`count` points evenly along a polyline (n, 3)."""
-    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-    places = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(places, along, axis) for axis in points.T], axis=1)

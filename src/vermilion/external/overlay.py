@@ -6,10 +6,10 @@ import numpy as np
 
 from vermilion.external.topology import ExternalTopology
 from vermilion.geometry.camera import portrait_camera
-from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label, tile
+from vermilion.imaging.draw import draw_points, draw_polyline, portrait, tile
 from vermilion.scan.overlay import registration_panels
 
-_SIZE_PX, _GROUND = 840, 40
+_SIZE_PX = 840
 _COLOURS = {
     "rigid": (250, 230, 60),
     "vermilion_upper": (255, 130, 20),
@@ -35,8 +35,7 @@ def _labelled(found: ExternalTopology, framed_mm: np.ndarray, title: str) -> np.
     """A panel with regions, contours (red, green) and landmarks (blue), framed on some points (N, 3)."""
     model = found.model
     camera = portrait_camera(framed_mm, _SIZE_PX)
-    image = np.full((_SIZE_PX, _SIZE_PX, 3), _GROUND, dtype=np.uint8)
-    image = draw_mesh(image, camera, model.neutral_mm, model.triangles)
+    image = portrait(camera, model.neutral_mm, model.triangles, title)
     for name, colour in _COLOURS.items():
         image = draw_points(image, camera.project(model.neutral_mm[model.regions[name]]), colour, 2)
     for loop, colour in (
@@ -46,5 +45,4 @@ def _labelled(found: ExternalTopology, framed_mm: np.ndarray, title: str) -> np.
         image = draw_polyline(
             image, camera.project(model.neutral_mm[np.append(loop, loop[0])]), colour
         )
-    image = draw_points(image, camera.project(model.neutral_mm[model.landmarks]), (60, 120, 255), 3)
-    return label(image, title)
+    return draw_points(image, camera.project(model.neutral_mm[model.landmarks]), (60, 120, 255), 3)

@@ -9,7 +9,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from vermilion.geometry.mesh import unique_edges
+from vermilion.geometry.mesh import connected_parts, unique_edges
+from vermilion.geometry.polylines import lengths_along
 
 #: Points of the 66-point scheme (DESIGN) round the mouth, each loop in order from the subject's
 #: right corner over the upper lip to the left corner and back under the lower lip.
@@ -111,7 +112,7 @@ def _spline(knots: np.ndarray) -> np.ndarray:
     """Dense points of the natural cubic spline through the knots, (60 n, 3)."""
     from scipy.interpolate import CubicSpline
 
-    chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
+    chord = lengths_along(knots)
     places = np.linspace(0, chord[-1], 60 * len(knots))
     return CubicSpline(chord, knots, bc_type="natural")(places)
 
@@ -127,8 +128,8 @@ def contour_halves(
         loop: (N,) vertex ids of the contour.
 
     Returns:
-        two arrays (n,) of vertex ids: the upper lip's path from the subject's right corner to the left, and the lower lip's back from
-        the left corner to the right; both corners are in both.
+        two arrays (n,) of vertex ids, the upper lip's path and the lower lip's, each from the subject's
+        right corner to the left one, both corners included.
     """
     points = neutral_mm[loop]
     right, left = (
@@ -140,15 +141,17 @@ def contour_halves(
     if points[1:turn, 1].mean() < points[turn + 1 :, 1].mean():  # the lower lip comes first
         loop = np.roll(loop[::-1], 1)
         turn = len(loop) - turn
-    return loop[: turn + 1], np.append(loop[turn:], loop[0])
+    return loop[: turn + 1], np.append(loop[turn:], loop[0])[::-1]
 
 
-def geodesic_distance(graph: sparse.spmatrix, sources: np.ndarray) -> np.ndarray:
-    """Distance along edges of every vertex to the nearest source, (V,) mm; inf where apart.
+def geodesic_distance(
+    graph: sparse.spmatrix, sources: np.ndarray, limit_mm: float = np.inf
+) -> np.ndarray:
+    """Distance along edges of every vertex to the nearest source, (V,) mm; inf beyond the limit, or where apart.
 
     `sources` (n,) vertices.
     """
-    return csgraph.dijkstra(graph, indices=np.unique(sources), min_only=True)
+    return csgraph.dijkstra(graph, indices=np.unique(sources), min_only=True, limit=limit_mm)
 
 
 def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int) -> np.ndarray:
@@ -160,9 +163,8 @@ def enclosed(triangles: np.ndarray, n_vertices: int, loop: np.ndarray, seed: int
     on_loop = np.zeros(n_vertices, dtype=bool)
     on_loop[loop] = True
     edges = edges[~on_loop[edges].any(axis=1)]
-    graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n_vertices,) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
-    return (label == label[seed]) & ~on_loop
+    part = connected_parts(edges, n_vertices)
+    return (part == part[seed]) & ~on_loop
 
 
 def upper_side(

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
+from vermilion.faces.contours import edge_graph, geodesic_distance
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import Mesh, adjacency, unique_edges
+from vermilion.geometry.mesh import Mesh, adjacency
 
 _INSIDE_RINGS = 2
 
@@ -56,18 +55,16 @@ def lip_sides_by_distance(
         return upper.astype(np.int8) - lower.astype(np.int8)
     inside = regions["mouth_inner"]
     mouth = upper | lower | inside
-    edges = unique_edges(mesh.triangles)
-    edges = edges[mouth[edges].all(axis=1)]
-    lengths = np.linalg.norm(mesh.vertices_mm[edges[:, 0]] - mesh.vertices_mm[edges[:, 1]], axis=1)
-    graph = sparse.csr_matrix((lengths, (edges[:, 0], edges[:, 1])), shape=(len(mouth),) * 2)
+    graph = edge_graph(mesh.vertices_mm, mesh.triangles)[mouth][:, mouth]
     to_upper, to_lower = (
-        csgraph.dijkstra(graph, directed=False, indices=np.flatnonzero(lip), min_only=True)
-        for lip in (upper, lower)
+        geodesic_distance(graph, np.flatnonzero(lip[mouth])) for lip in (upper, lower)
     )
     is_upper = to_upper + corner_mm < to_lower
     is_lower = to_lower + corner_mm < to_upper
-    is_lower |= inside & (to_lower + corner_mm == to_upper) & np.isfinite(to_lower)
-    return np.where(mouth, is_upper.astype(np.int8) - is_lower, 0).astype(np.int8)
+    is_lower |= inside[mouth] & (to_lower + corner_mm == to_upper) & np.isfinite(to_lower)
+    sides = np.zeros(len(mouth), dtype=np.int8)
+    sides[mouth] = is_upper.astype(np.int8) - is_lower
+    return sides
 
 
 def triangle_sides(triangles: np.ndarray, sides: np.ndarray) -> np.ndarray:

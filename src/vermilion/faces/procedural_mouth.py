@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from vermilion.faces.procedural_head import chart_at, skin_point, smoothstep
+from vermilion.geometry.polylines import lengths_along
 
 HALF_WIDTH_MM = 26.0
 STOMION_Y_MM = -39.0
@@ -76,7 +77,7 @@ class LipLoop:
         self.length_mm = 0.0
         for upper in (True, False):
             xy = _border_xy(u, np.full(len(u), upper))
-            length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
+            length = lengths_along(xy)
             self._tables.append(PchipInterpolator(length / length[-1], u))
             self.length_mm += float(length[-1])
 

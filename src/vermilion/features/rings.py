@@ -45,8 +45,8 @@ def lip_rings(model: FaceModel, n_samples: int) -> tuple[Ring, Ring]:
 
 
 def _ring(model: FaceModel, loop: np.ndarray, n_samples: int) -> Ring:
-    halves = contour_halves(model.neutral_mm, model.landmarks, loop)
-    parts = [_along(model.neutral_mm, half, n_samples // 2) for half in halves]
+    above, below = contour_halves(model.neutral_mm, model.landmarks, loop)
+    parts = [_along(model.neutral_mm, half, n_samples // 2) for half in (above, below[::-1])]
     return Ring(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 

@@ -131,8 +131,12 @@ class Camera:
 
     def resized(self, scale: float) -> Camera:
         """The camera of the image resized by `scale` (sizes rounded)."""
+        return self.resized_to(round(self.width_px * scale), round(self.height_px * scale))
+
+    def resized_to(self, width_px: int, height_px: int) -> Camera:
+        """The camera of the image resized to a width and height."""
         camera = self.colmap()
-        camera.rescale(round(self.width_px * scale), round(self.height_px * scale))
+        camera.rescale(width_px, height_px)
         return replace(
             self,
             params=tuple(camera.params),

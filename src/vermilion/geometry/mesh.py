@@ -103,6 +103,12 @@ def adjacency(triangles: np.ndarray, n_vertices: int) -> sparse.csr_matrix:
     return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n_vertices,) * 2)
 
 
+def connected_parts(edges: np.ndarray, n_vertices: int) -> np.ndarray:
+    """Number (V,) of the part that each vertex is in, of those that edges (E, 2) hold together."""
+    graph = sparse.csr_matrix((np.ones(len(edges)), edges.T), shape=(n_vertices, n_vertices))
+    return sparse.csgraph.connected_components(graph, directed=False)[1]
+
+
 def submesh(triangles: np.ndarray, keep_vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Crop to the vertices of a mask.
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from vermilion.faces.contours import edge_graph, geodesic_distance
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import adjacency, unique_edges
+from vermilion.geometry.mesh import adjacency, connected_parts, unique_edges
 from vermilion.storage.errors import InputError
 
 #: Defaults, mm along the surface from the lips' inner edge. What other sizes cost: docs/guided.md.
@@ -223,10 +221,8 @@ def _followers(triangles: np.ndarray, of_inner: np.ndarray, trusted: np.ndarray)
     n_vertices = len(of_inner)
     edges = unique_edges(triangles)
     outside = edges[~of_inner[edges].any(axis=1)]
-    graph = sparse.csr_matrix(
-        (np.ones(len(outside)), (outside[:, 0], outside[:, 1])), shape=(n_vertices, n_vertices)
-    )
-    count, part = csgraph.connected_components(graph, directed=False)
+    part = connected_parts(outside, n_vertices)
+    count = part.max() + 1
     crossing = edges[of_inner[edges].sum(axis=1) == 1]
     touching = np.zeros(count, dtype=bool)
     touching[part[crossing[~of_inner[crossing]]]] = True
@@ -240,11 +236,7 @@ def _check_held(
     predicted: np.ndarray, n_vertices: int, border: np.ndarray, free: np.ndarray
 ) -> None:
     """Every connected piece of the inner lips needs a vertex on the border."""
-    edges = unique_edges(predicted)
-    graph = sparse.csr_matrix(
-        (np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n_vertices, n_vertices)
-    )
-    _, part = csgraph.connected_components(graph, directed=False)
+    part = connected_parts(unique_edges(predicted), n_vertices)
     loose = np.setdiff1d(part[free], part[border])
     if len(loose):
         raise InputError(

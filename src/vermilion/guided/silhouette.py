@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
+from vermilion.faces.contours import contour_halves
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
@@ -196,17 +196,12 @@ def outer_contours(
 
 def outer_halves(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     """Edges (n, 2) of the outer contour's upper and lower half, split at the mouth corners."""
+    upper, _ = contour_halves(face.neutral_mm, face.landmarks, face.outer_contour)
     loop = np.asarray(face.outer_contour, dtype=np.int64)
-    points = face.neutral_mm[loop]
-    corners = face.neutral_mm[face.landmarks[[RIGHT_CORNER, LEFT_CORNER]]]
-    right, left = (int(np.linalg.norm(points - c, axis=1).argmin()) for c in corners)
-    loop, points = np.roll(loop, -right), np.roll(points, -right, axis=0)
-    turn = (left - right) % len(loop)
+    loop = np.roll(loop, -np.flatnonzero(loop == upper[0])[0])
     edges = np.stack([loop, np.roll(loop, -1)], axis=1)
-    first, second = edges[:turn], edges[turn:]
-    if points[1:turn, 1].mean() < points[turn + 1 :, 1].mean():
-        return second, first
-    return first, second
+    on_upper = np.isin(edges, upper).all(axis=1)
+    return edges[on_upper], edges[~on_upper]
 
 
 def _normals(vertices_mm: np.ndarray, surface: LipSurface) -> np.ndarray:

@@ -151,6 +151,30 @@ def tile(images: Sequence[np.ndarray], columns: int) -> np.ndarray:
     return np.vstack(rows)
 
 
+def sheet(images: Sequence[np.ndarray], columns: int = 3) -> np.ndarray:
+    """A contact sheet (H, W, 3) uint8 of `images` (h, w, 3); a grey field where there are none."""
+    return tile(images, columns) if images else np.full((64, 256, 3), 90, dtype=np.uint8)
+
+
+def portrait(
+    camera: Camera,
+    vertices_mm: np.ndarray,
+    triangles: np.ndarray,
+    title: str,
+    colours: np.ndarray | None = None,
+) -> np.ndarray:
+    """A mesh on a plain ground with its name, (h, w, 3) uint8.
+
+    Args:
+        camera: what it is seen from, of the image's size.
+        vertices_mm: (V, 3) world, mm.
+        triangles: (T, 3).
+        colours: (V, 3) in [0, 1]; light grey by default.
+    """
+    ground = np.full((camera.height_px, camera.width_px, 3), 40, dtype=np.uint8)
+    return label(draw_mesh(ground, camera, vertices_mm, triangles, colours), title)
+
+
 def _fixed(points_px: np.ndarray) -> np.ndarray:
     """Finite pixels as OpenCV's fixed-point integers; its pixel centres are whole numbers."""
     points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)

@@ -13,8 +13,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from vermilion.faces.contours import edge_graph, geodesic_distance
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import triangle_areas, unique_edges
+from vermilion.geometry.mesh import connected_parts, triangle_areas, unique_edges
 from vermilion.geometry.raycast import RayCaster
 from vermilion.storage.errors import InputError
 
@@ -32,7 +33,7 @@ class LipDomain:
     Attributes:
         in_domain: (T,) bool, triangles that carry texture.
         skin: (T,) bool, triangles of the outer face, in the domain or not.
-        lip: (T,) int8: 1 upper vermilion, 2 lower, 0 elsewhere.
+        lip: (T,) int8: +1 upper vermilion, -1 lower, 0 elsewhere.
         corners: (2,) vertices at both ends of the lips.
         texel_of_vertex: (V, 2) x, y in texels of each vertex.
         triangle: (h, w) int32 triangle of the mesh at each texel, -1 outside.
@@ -129,7 +130,8 @@ def lip_domain(model: FaceModel, skin_mm: float, inner_mm: float, texel_mm: floa
             "regions vermilion_upper and vermilion_lower",
             "Use a template whose lips are marked.",
         )
-    distance = _distance_from(model, vermilion, max(skin_mm, inner_mm))
+    graph = edge_graph(model.neutral_mm, model.triangles)
+    distance = geodesic_distance(graph, np.flatnonzero(vermilion), max(skin_mm, inner_mm))
     inside = model.regions["mouth_inner"] & ~vermilion
     never = model.regions["teeth"] | model.regions["eyes"]
     keep = np.where(inside, distance <= inner_mm, distance <= skin_mm) & ~never
@@ -165,7 +167,7 @@ def _lip_of_triangle(model: FaceModel) -> np.ndarray:
     upper, lower = model.regions["vermilion_upper"], model.regions["vermilion_lower"]
     red = (upper | lower)[model.triangles].all(axis=1)
     is_upper = upper[model.triangles].sum(axis=1) >= 2
-    return np.where(red, np.where(is_upper, 1, 2), 0).astype(np.int8)
+    return np.where(red, np.where(is_upper, 1, -1), 0).astype(np.int8)
 
 
 def _ends_of(model: FaceModel, vermilion: np.ndarray) -> np.ndarray:
@@ -174,18 +176,6 @@ def _ends_of(model: FaceModel, vermilion: np.ndarray) -> np.ndarray:
     points = model.neutral_mm[red] - model.neutral_mm[red].mean(axis=0)
     along = points @ np.linalg.eigh(points.T @ points)[1][:, -1]
     return red[[along.argmin(), along.argmax()]]
-
-
-def _distance_from(model: FaceModel, source: np.ndarray, limit_mm: float) -> np.ndarray:
-    """Shortest path along edges from the source vertices, (V,) mm, infinite beyond the limit."""
-    edges = unique_edges(model.triangles)
-    ends = model.neutral_mm[edges]
-    length = np.maximum(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), 1e-6)
-    size = (model.n_vertices,) * 2
-    graph = sparse.csr_matrix((length, (edges[:, 0], edges[:, 1])), shape=size)
-    return csgraph.dijkstra(
-        graph, directed=False, indices=np.flatnonzero(source), min_only=True, limit=limit_mm
-    )
 
 
 def _charted(model: FaceModel, candidates: np.ndarray, vermilion: np.ndarray) -> np.ndarray:
@@ -205,10 +195,7 @@ def _charted(model: FaceModel, candidates: np.ndarray, vermilion: np.ndarray) ->
     longest = _edge_stretch(uv, model).max(axis=1)
     sane = candidates & (density / typical > 1 / _SHRINK_LIMIT)
     sane &= longest < _STRETCH_LIMIT * np.median(longest[on_lips])
-    edges = unique_edges(model.triangles[sane])
-    size = (model.n_vertices,) * 2
-    graph = sparse.csr_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=size)
-    part = csgraph.connected_components(graph, directed=False)[1]
+    part = connected_parts(unique_edges(model.triangles[sane]), model.n_vertices)
     with_lips = np.unique(part[model.triangles[sane & on_lips].reshape(-1)])
     return sane & np.isin(part[model.triangles[:, 0]], with_lips)
 

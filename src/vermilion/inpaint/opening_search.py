@@ -87,11 +87,11 @@ def _grid(place: MouthPlace, step: float) -> tuple[np.ndarray, np.ndarray, np.nd
 def _contours_of_mesh(lip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Columns with both lips; the first row past the upper lip and the first row of the lower."""
     rows = np.arange(len(lip))[:, None]
-    columns = np.flatnonzero((lip == 1).any(axis=0) & (lip == 2).any(axis=0))
+    columns = np.flatnonzero((lip == 1).any(axis=0) & (lip == -1).any(axis=0))
     if len(columns) < 8:
         return None
     upper = np.where(lip == 1, rows + 1, 0).max(axis=0)[columns].astype(float)
-    lower = np.where(lip == 2, rows, len(lip)).min(axis=0)[columns].astype(float)
+    lower = np.where(lip == -1, rows, len(lip)).min(axis=0)[columns].astype(float)
     middle = 0.5 * (upper + lower)
     closed = lower <= upper
     return columns, np.where(closed, middle, upper), np.where(closed, middle, lower)
@@ -99,7 +99,7 @@ def _contours_of_mesh(lip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def _beyond_lips(lip: np.ndarray) -> np.ndarray:
     """Skin above the upper and below the lower lip of each column."""
-    seen = lip > 0
+    seen = lip != 0
     return ~(np.maximum.accumulate(seen) & np.maximum.accumulate(seen[::-1])[::-1])
 
 
@@ -120,7 +120,7 @@ def _score(
     # Distance from the contour, positive on the lips.
     past = np.maximum(upper - rows, rows - lower) * step_mm
     edge = int(np.ceil(0.5 * settings.clear_mm / step_mm))
-    red = cv2.erode((lip > 0).astype(np.uint8), np.ones((3, 3)), iterations=edge) > 0
+    red = cv2.erode((lip != 0).astype(np.uint8), np.ones((3, 3)), iterations=edge) > 0
     ink = colours[red & (past > settings.clear_mm)]
     inside = colours[past < -settings.inside_mm]
     if len(ink) < _MIN_SAMPLES:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 
@@ -19,13 +17,6 @@ def before_after(frame: int, before: np.ndarray, after: np.ndarray) -> np.ndarra
     size = (max(1, round(before.shape[1] * (240 / before.shape[0]))), 240)
     pair = [cv2.resize(image, size, interpolation=cv2.INTER_CUBIC) for image in (before, after)]
     return np.vstack([label(pair[0], f"{frame}"), pair[1]])
-
-
-def contact_sheet(tiles: Sequence[np.ndarray], columns: int = 4) -> np.ndarray:
-    """`tiles` (h, w, 3) uint8 side by side in rows, (H, W, 3); a note where there are none."""
-    if not tiles:
-        return label(np.full((60, 480, 3), 40, dtype=np.uint8), "no frame could be painted")
-    return tile(tiles, columns)
 
 
 def texture_sheet(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -24,6 +24,11 @@ def evenly_spaced(n: int, count: int) -> np.ndarray:
         (min(n, count),) int64, ascending.
     """
     return np.linspace(0, n - 1, min(count, n)).round().astype(np.int64)
+
+
+def evenly_taken(frames: Sequence[int], count: int) -> set[int]:
+    """At most `count` of the frames, evenly taken, the first and the last among them."""
+    return {int(frames[index]) for index in evenly_spaced(len(frames), count)}
 
 
 def readable(items: Iterable[Item], read: Callable[[Item], Read]) -> Iterator[tuple[Item, Read]]:

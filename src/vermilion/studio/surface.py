@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from vermilion.faces.contours import (
@@ -16,7 +15,7 @@ from vermilion.faces.contours import (
     upper_side,
 )
 from vermilion.faces.model import FaceModel
-from vermilion.geometry.mesh import unique_edges
+from vermilion.geometry.mesh import connected_parts, unique_edges
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
 
 SKIN, MOUTH, TEETH, EYE = range(4)
@@ -69,10 +68,7 @@ def surface_of(model: FaceModel) -> Surface:
 
 def _skin_part(model: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     """Triangles of the part that the landmarks lie on, and the part number of each vertex."""
-    edges = unique_edges(model.triangles)
-    n_vertices = model.n_vertices
-    graph = sparse.coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n_vertices,) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
+    label = connected_parts(unique_edges(model.triangles), model.n_vertices)
     home = label[model.landmarks[8]]
     label = np.where(label == home, -1, label)
     return model.triangles[label[model.triangles[:, 0]] == -1], label

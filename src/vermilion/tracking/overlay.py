@@ -13,6 +13,7 @@ from vermilion.imaging.draw import draw_mesh, draw_points, draw_polyline, label,
 from vermilion.imaging.frames import FrameSource
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.frames import evenly_spaced
+from vermilion.tracking.result import TrackedTake
 
 _SIDE_PX = 480
 
@@ -45,32 +46,28 @@ def _draw_outline(image, camera, vertices_mm, model):
 
 def tracking_overlay(
     source: FrameSource,
-    camera: Camera,
     model: FaceModel,
+    fit: TrackedTake,
     frames: Sequence[int],
     vertices_mm: np.ndarray,
     landmarks: LandmarkTrack,
-    valid: np.ndarray,
     count: int,
-    columns: int = 3,
 ) -> np.ndarray:
     """Evenly spaced frames of a chunk, cropped to the face, with mesh, contours and landmarks.
 
     Args:
         source: images of the take.
-        camera: of the images.
         model: topology and contours of the meshes.
+        fit: the take's track: the camera, and which frames are valid; the others are labelled "not tracked".
         frames: (F,) numbers.
         vertices_mm: (F, V, 3), world.
         landmarks: of these frames or more.
-        valid: (F,) bool; the others are labelled "not tracked".
         count: frames to show, at most.
-        columns: of the sheet.
 
     Returns:
         (h, w, 3) uint8.
     """
-    images = []
+    images, camera, valid = [], fit.camera, fit.valid[fit.index_of(frames)]
     rows = {int(frame): row for row, frame in enumerate(landmarks.frames)}
     for index in evenly_spaced(len(frames), count):
         frame = int(frames[index])
@@ -80,7 +77,7 @@ def tracking_overlay(
             drawn = draw_points(drawn, landmarks.points_px[rows[frame]], (0, 255, 0), 1)
         crop = crop_to_points(drawn, camera.project(vertices_mm[index]))
         images.append(label(crop, f"{frame}" if valid[index] else f"{frame}: not tracked"))
-    return tile(images, columns)
+    return tile(images, 3)
 
 
 def crop_to_points(image: np.ndarray, points_px: np.ndarray, margin: float = 0.08) -> np.ndarray:

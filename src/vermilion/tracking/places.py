@@ -17,6 +17,7 @@ from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
+from vermilion.geometry.polylines import lengths_along
 from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
 from vermilion.storage.arrays import read_arrays, write_arrays
@@ -132,7 +133,7 @@ def _lip_places(model: FaceModel, landmark_set: LandmarkSet, shape: np.ndarray) 
     right, left = landmark_set.outer_corners
     for name, loop in (("inner", model.inner_contour), ("outer", model.outer_contour)):
         upper, lower = contour_halves(model.neutral_mm, model.landmarks, loop)
-        for lip, path in (("upper", upper), ("lower", lower[::-1])):
+        for lip, path in (("upper", upper), ("lower", lower)):
             line = landmark_set.lip_line(lip, name)
             if right not in line:  # the model's contours share their corners, the set's do not
                 line = np.concatenate([[right], line, [left]])
@@ -152,42 +153,18 @@ def _shares(
 
     Points that are of `ibug66` lie where the model's landmarks do; between these the shape tells.
     """
-    along = _lengths(shape[line])
+    along = lengths_along(shape[line])
     vertex_of = dict(zip(landmark_set.ibug66.tolist(), model.landmarks.tolist(), strict=True))
     known = [row for row, point in enumerate(line.tolist()) if point in vertex_of]
     ends = model.neutral_mm[[vertex_of[int(line[row])] for row in known]]
     points = model.neutral_mm[path]
     nearest = np.linalg.norm(points[None] - ends[:, None], axis=2).argmin(axis=1)
-    return np.interp(along, along[known], _lengths(points)[nearest])
-
-
-def _lengths(points: np.ndarray) -> np.ndarray:
-    """Length of a polyline (n, 3) up to each of its points, (n,)."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    return np.interp(along, along[known], lengths_along(points)[nearest])
 
 
 def _along(model: FaceModel, path: np.ndarray, along_mm: np.ndarray) -> SurfacePoints:
     """Places at lengths (n,) mm along a path of vertices."""
-    lengths = _lengths(model.neutral_mm[path])
+    lengths = lengths_along(model.neutral_mm[path])
     edge = np.clip(np.searchsorted(lengths, along_mm, side="right") - 1, 0, len(path) - 2)
-    start, end = path[edge], path[edge + 1]
     fraction = np.clip((along_mm - lengths[edge]) / (lengths[edge + 1] - lengths[edge]), 0.0, 1.0)
-    triangle = _triangles_of(np.stack([start, end], axis=1), model.triangles)
-    corner = model.triangles[triangle]
-    weights = (corner == start[:, None]) * (1 - fraction[:, None])
-    weights = weights + (corner == end[:, None]) * fraction[:, None]
-    return SurfacePoints(triangle, weights)
-
-
-def _triangles_of(edges: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """A triangle that has each of the edges (n, 2), (n,) int32."""
-    n_vertices = int(triangles.max()) + 1
-
-    def keys(pairs):
-        pairs = np.sort(pairs.astype(np.int64), axis=1)
-        return pairs[:, 0] * n_vertices + pairs[:, 1]
-
-    there = keys(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
-    order = np.argsort(there, kind="stable")
-    return (order[np.searchsorted(there, keys(edges), sorter=order)] // 3).astype(np.int32)
+    return SurfacePoints.on_edges(path[edge], path[edge + 1], fraction, model.triangles)

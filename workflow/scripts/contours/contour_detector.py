@@ -6,7 +6,6 @@ from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.labelled_frames import offset_rows, read_labelled
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
-from vermilion.contours.maps import evenly
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.contours.training import TrainingSettings, train_detector
 from vermilion.faces.model import FaceModel
@@ -48,7 +47,7 @@ def from_track(cfg, camera, source, track, rings, dense):
     )  # fmt: skip
     return learn_from_take(
         detector,
-        sorted(evenly(rings.frames, options.frames)),
+        sorted(evenly_taken(rings.frames, options.frames)),
         lambda frame: source.read(camera, frame),
         landmarks.__getitem__,
         rings,

@@ -4,7 +4,7 @@ from vermilion.config.contours import ContourMapsConfig
 from vermilion.contours.detector_file import load_detector
 from vermilion.contours.labels import label_paths, read_label
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
-from vermilion.contours.maps import evenly, frame_maps, maps_overlay, sheet, write_maps
+from vermilion.contours.maps import frame_maps, maps_overlay, write_maps
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
@@ -35,7 +35,7 @@ def main(snakemake) -> None:
         lips = TrackedLips.of(FaceModel.load(snakemake.input.tracker))
         camera = TrackedTake.load(snakemake.input.fit).camera
         lips_px = {f: lips.rings_px(coarse[row], camera) for row, f in enumerate(frames)}
-    shown = evenly(frames, cfg.overlay_frames)
+    shown = evenly_taken(frames, cfg.overlay_frames)
     rows, images = [], []
     with atomic_folder(snakemake.output.maps) as folder:
         for index, frame in enumerate(progress(frames, "contour maps")):

@@ -1,12 +1,9 @@
 """What each frame of a chunk tells of the take's light, on the mesh with relief."""
 
-from dataclasses import fields
-
 from vermilion.detail.relief.frames import ReliefScene
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.light_evidence import LightEvidence, frame_evidence
 from vermilion.detail.relief.relief import ReliefSettings
-from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.provenance.begun_run import begin_job
@@ -17,15 +14,10 @@ from vermilion.tracking.result import TrackedTake
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    topology = FineTopology.of(
-        FaceModel.load(inputs.tracker), cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"]
-    )
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
     span = (params.frames[0], params.frames[-1])
-    scene = ReliefScene.open(topology, inputs, source, span, cfg["detail.relief.face_px"])
-    settings = ReliefSettings(
-        **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
-    )
+    scene = ReliefScene.open(FaceModel.load(inputs.tracker), inputs, source, span, cfg)
+    settings = ReliefSettings.of(cfg)
     start, fit = ClipLight.load(inputs.start), TrackedTake.load(inputs.fit)
     # After a cut the light may be another one: that of the first piece counts, as before.
     lit = set(fit.frames[fit.valid & (fit.pieces == fit.pieces[0])].tolist())

@@ -1,13 +1,12 @@
 """One light that fits all frames of a take, and the albedo of its first frames under it."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from vermilion.detail.relief.frames import ReliefScene
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.light_evidence import LightEvidence, fitted_light
 from vermilion.detail.relief.relief import ReliefSettings
 from vermilion.detail.relief.standing_relief import with_standing_relief
-from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
 from vermilion.provenance.begun_run import begin_job
@@ -15,14 +14,9 @@ from vermilion.provenance.begun_run import begin_job
 
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
-    topology = FineTopology.of(
-        FaceModel.load(inputs.tracker), cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"]
-    )
     source = open_frames(params.source, snakemake.wildcards.subject, snakemake.wildcards.take)
-    scene = ReliefScene.open(topology, inputs, source, params.span, cfg["detail.relief.face_px"])
-    settings = ReliefSettings(
-        **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
-    )
+    scene = ReliefScene.open(FaceModel.load(inputs.tracker), inputs, source, params.span, cfg)
+    settings = ReliefSettings.of(cfg)
     start = ClipLight.load(inputs.start)
     light = fitted_light([LightEvidence.load(path) for path in inputs.evidence], start.light)
     first = {frame: scene.observe(frame, scene.fine(frame)) for frame in start.frames.tolist()}

@@ -12,15 +12,14 @@ from vermilion.detail.relief.frames import (
 from vermilion.detail.relief.light import ClipLight
 from vermilion.detail.relief.normal_map import NormalMap
 from vermilion.detail.relief.overlay import relief_panels
-from vermilion.detail.relief.topology import FineTopology
 from vermilion.faces.model import FaceModel
-from vermilion.imaging.draw import tile
+from vermilion.imaging.draw import sheet
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_channels, write_srgb8
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
-from vermilion.storage.frames import evenly_spaced
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
@@ -32,19 +31,19 @@ def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     model, light = FaceModel.load(inputs.tracker), ClipLight.load(inputs.light)
-    topology = FineTopology.of(model, cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"])
     first, last = params.span
     own, fit = (params.frames[0], params.frames[-1]), TrackedTake.load(inputs.fit)
     source = open_frames(params.source, *place)
-    scene = ReliefScene.open(topology, inputs, source, own, cfg["detail.relief.face_px"])
+    scene = ReliefScene.open(model, inputs, source, own, cfg)
+    topology = scene.topology
     reader = ReliefReader(inputs.reliefs, range(first, last + 1))
     maps = NormalMap(topology, model.uv, cfg["detail.relief.map_px"])
     window, weight = cfg["detail.relief.window"], cfg["detail.relief.position_weight"]
-    shown = set(evenly_spaced(len(params.frames), cfg["detail.relief.overlay_frames"]).tolist())
+    shown = evenly_taken(params.frames, cfg["detail.relief.overlay_frames"])
     meshes, quality, panels = [], [], []
     heights = snakemake.output.displacements
     with atomic_folder(snakemake.output.maps) as folder, atomic_folder(heights) as raised:
-        for index, frame in enumerate(progress(list(params.frames), "meshes with relief")):
+        for frame in progress(list(params.frames), "meshes with relief"):
             smooth = scene.fine(frame)
             span = fit.piece_span(frame)  # normals are not averaged across a cut
             mesh = mesh_with_relief(topology, smooth, reader, frame, span, window, weight)
@@ -56,12 +55,11 @@ def main(snakemake):
             meshes.append(mesh)
             row, image, errors = residuals(scene, light, reader, frame, smooth, mesh)
             quality.append(row)
-            if index in shown and image is not None:
+            if frame in shown and image is not None:
                 panels += relief_panels(
                     f"{frame}", image, scene.camera, topology, smooth, mesh, errors
                 )
-    blank = np.zeros((64, 256, 3), dtype=np.uint8)
-    write_srgb8(snakemake.output.overlay, tile(panels, 4) if panels else blank)
+    write_srgb8(snakemake.output.overlay, sheet(panels, 4))
     write_quality(snakemake.output.quality, *place, "relief", quality)
     for name, path in (("before", snakemake.output.start), ("after", snakemake.output.after)):
         rows = [

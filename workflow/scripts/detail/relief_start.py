@@ -1,12 +1,9 @@
 """Light, albedo and noise of a take from its first frames, and the topology of its relief."""
 
-from dataclasses import fields
-
 from vermilion.detail.relief.frames import ReliefScene
 from vermilion.detail.relief.light import estimate_light
 from vermilion.detail.relief.relief import ReliefSettings
 from vermilion.detail.relief.standing_relief import with_standing_relief
-from vermilion.detail.relief.topology import FineTopology
 from vermilion.export.objs import write_obj
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.frames import open_frames
@@ -18,11 +15,10 @@ from vermilion.tracking.result import TrackedTake
 def main(snakemake):
     inputs, params, cfg = snakemake.input, snakemake.params, snakemake.params.cfg
     model = FaceModel.load(inputs.tracker)
-    topology = FineTopology.of(model, cfg["detail.relief.levels"], cfg["detail.relief.spacing_mm"])
-    first, last = params.span
+    first = params.span[0]
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
     source = open_frames(params.source, *place)
-    scene = ReliefScene.open(topology, inputs, source, (first, last), cfg["detail.relief.face_px"])
+    scene = ReliefScene.open(model, inputs, source, params.span, cfg)
     fit, count = TrackedTake.load(inputs.fit), cfg["detail.relief.light_frames"]
     frames, seen = fit.frames[fit.valid & (fit.pieces == fit.pieces[0])][:count].tolist(), {}
     for frame in frames:
@@ -41,16 +37,14 @@ def main(snakemake):
     light = estimate_light(
         list(seen),
         list(seen.values()),
-        topology,
+        scene.topology,
         scene.centres(first),
         cfg["detail.relief.detail_mm"],
     )
-    settings = ReliefSettings(
-        **{f.name: cfg[f"detail.relief.{f.name}"] for f in fields(ReliefSettings)}
-    )
+    settings = ReliefSettings.of(cfg)
     with_standing_relief(light, scene, seen, settings).save(snakemake.output.light)
-    uv = topology.finer @ model.uv
-    write_obj(snakemake.output.topology, scene.fine(first), topology.triangles, uv)
+    uv = scene.topology.finer @ model.uv
+    write_obj(snakemake.output.topology, scene.fine(first), scene.topology.triangles, uv)
 
 
 if __name__ == "__main__":

@@ -33,16 +33,10 @@ def main(snakemake):
         model, fit, rows, read_sequence(inputs.coarse), Identity.load(inputs.identity).neutral_mm,
         Placement.load(inputs.placement),
     )  # fmt: skip
-    image = tracking_overlay(
-        open_frames(snakemake.params.source, subject, take),
-        fit.camera,
-        model,
-        frames,
-        vertices,
-        LandmarkTrack.load(inputs.landmarks),
-        fit.valid[rows],
-        snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
-    )
+    source = open_frames(snakemake.params.source, subject, take)
+    landmarks = LandmarkTrack.load(inputs.landmarks)
+    count = snakemake.params.cfg["tracking.meshes"]["overlay_frames"]
+    image = tracking_overlay(source, model, fit, frames, vertices, landmarks, count)
     write_srgb8(snakemake.output.overlay, image)
     lost = reasons_of(inputs.quality)
     quality = [

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from vermilion.config.features import ContourFeaturesConfig, ShapeFeaturesConfig
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
-from vermilion.contours.maps import evenly, read_maps, sheet
+from vermilion.contours.maps import read_maps
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
 from vermilion.features.contradiction import contradiction
@@ -47,7 +47,7 @@ def main(snakemake) -> None:
     print(f"{space.size} shape coefficients hold {space.kept:.2%} of the variance")
     sampler = ContourSampler.of(model, cfg.samples, SearchSettings.of(cfg))
     source = open_frames(snakemake.params.source, subject, take)
-    shown = evenly(list(snakemake.params.frames), cfg.overlay_frames)
+    shown = evenly_taken(snakemake.params.frames, cfg.overlay_frames)
     rings, lips = landmark_rings(snakemake.input.landmarks), TrackedLips.of(model)
     contours, quality, images = [], [], []
     for index, frame in enumerate(progress(list(snakemake.params.frames), "features")):

@@ -5,7 +5,7 @@ import numpy as np
 from vermilion.config.inpaint import CompositeConfig, DomainConfig, OpeningConfig, ShadingConfig
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
-from vermilion.imaging.draw import to_display
+from vermilion.imaging.draw import sheet, to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.inpaint.domain import lip_domain
@@ -13,12 +13,12 @@ from vermilion.inpaint.files import read_texture
 from vermilion.inpaint.frame import InpaintInputs, inpaint_frame
 from vermilion.inpaint.grain import noise_seed
 from vermilion.inpaint.opening import OpeningSettings
-from vermilion.inpaint.overlay import before_after, contact_sheet
+from vermilion.inpaint.overlay import before_after
 from vermilion.inpaint.shading import ShadingSettings
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
-from vermilion.storage.frames import evenly_spaced
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import read_sequence
@@ -51,7 +51,7 @@ def main(snakemake):
     source = open_frames(snakemake.params.source, **place)
     meshes = read_sequence(snakemake.input.meshes)
     frames, rows, tiles = snakemake.params.frames, [], []
-    shown = [frames[i] for i in evenly_spaced(len(frames), 8)]
+    shown = evenly_taken(frames, 8)
     with atomic_folder(snakemake.output.frames) as folder:
         for index, frame in enumerate(progress(frames, "inpaint {subject}/{take}".format(**place))):
             try:
@@ -77,7 +77,7 @@ def main(snakemake):
             if frame in shown:
                 before = np.rint(painted.before * 255).astype(np.uint8)
                 tiles.append(before_after(frame, before, after[painted.window.slices]))
-    write_srgb8(snakemake.output.overlay, contact_sheet(tiles))
+    write_srgb8(snakemake.output.overlay, sheet(tiles, 4))
     write_quality(snakemake.output.quality, **place, stage="inpaint", rows=rows)
 
 

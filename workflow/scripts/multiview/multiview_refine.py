@@ -13,7 +13,7 @@ from vermilion.multiview.stereo import StereoSettings
 from vermilion.multiview.take import MultiviewImages, Refiner, RefineSettings
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import write_array
-from vermilion.storage.frames import evenly_spaced
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import write_sequence
@@ -34,7 +34,7 @@ def main(snakemake):
     refiner = Refiner(
         images, model, snakemake.params.neutral, neutral, stereo, settings, FlowMatcher()
     )
-    drawn = {frames[i] for i in evenly_spaced(len(frames), 3)}
+    drawn = evenly_taken(frames, 3)
     meshes, seeing, rows, shown = [], [], [], []
     for number, start in progress(zip(frames, coarse, strict=True), "multiview", len(frames)):
         found = refiner.refine(number, start)

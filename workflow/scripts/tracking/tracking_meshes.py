@@ -19,16 +19,10 @@ def main(snakemake):
     rows = fit.index_of(frames)
     offsets = read_sequence(inputs.offsets) if inputs.get("offsets") else None
     vertices = fit.vertices_mm(tracker, Identity.load(inputs.identity), rows, offsets)
-    image = tracking_overlay(
-        open_frames(snakemake.params.source, subject, take),
-        fit.camera,
-        tracker,
-        frames,
-        vertices,
-        LandmarkTrack.load(inputs.landmarks),
-        fit.valid[rows],
-        snakemake.params.cfg["tracking.meshes"]["overlay_frames"],
-    )
+    source = open_frames(snakemake.params.source, subject, take)
+    landmarks = LandmarkTrack.load(inputs.landmarks)
+    count = snakemake.params.cfg["tracking.meshes"]["overlay_frames"]
+    image = tracking_overlay(source, tracker, fit, frames, vertices, landmarks, count)
     write_srgb8(snakemake.output.overlay, image)
     write_quality(snakemake.output.quality, subject, take, "tracking", quality_rows(fit, rows))
     write_sequence(snakemake.output.meshes, vertices)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
+from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.guided.curves import first_self_crossing, mouth_axes
@@ -23,7 +23,7 @@ class LipLines:
         self._surface = surface
         self._lines: dict[str, np.ndarray] = {}
         for part, loop in (("inner", face.inner_contour), ("outer", face.outer_contour)):
-            upper, lower = _halves(face, np.asarray(loop, dtype=np.int64))
+            upper, lower = contour_halves(face.neutral_mm, face.landmarks, loop)
             self._lines |= {f"upper_{part}": upper, f"lower_{part}": lower}
 
     def segments(self, vertices_mm: np.ndarray, camera: Camera) -> dict[str, Segments]:
@@ -63,15 +63,3 @@ class LipLines:
         return float(
             np.concatenate([found[name].nearest(view.samples[name])[1] for name in found]).mean()
         )
-
-
-def _halves(face: FaceModel, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices of a loop (n,) as two lines (m,), upper and lower, from the right to the left corner."""
-    points = face.neutral_mm[loop]
-    corners = face.neutral_mm[face.landmarks[[RIGHT_CORNER, LEFT_CORNER]]]
-    right, left = (int(np.linalg.norm(points - c, axis=1).argmin()) for c in corners)
-    loop, points = np.roll(loop, -right), np.roll(points, -right, axis=0)
-    turn = (left - right) % len(loop)
-    first, second = loop[: turn + 1], np.r_[loop[turn:], loop[0]][::-1]
-    above = face.neutral_mm[first, 1].mean() >= face.neutral_mm[second, 1].mean()
-    return (first, second) if above else (second, first)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from vermilion.detail.relief.relief import ReliefSettings, solve_relief
 from vermilion.detail.relief.skin_observation import FaceImage, SkinObservation
 from vermilion.detail.relief.tilts import average_tilts, tangents, tilted_normals, tilts_of
 from vermilion.detail.relief.topology import FineTopology
+from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import incidence, triangle_normals, vertex_normals
 from vermilion.imaging.frames import FrameSource
@@ -53,13 +54,20 @@ class ReliefScene:
     @classmethod
     def open(
         cls,
-        topology: FineTopology,
+        model: FaceModel,
         inputs: ReliefFiles,
         source: FrameSource,
         span: tuple[int, int],
-        face_px: int,
+        cfg: Mapping[str, Any],
     ) -> ReliefScene:
-        """Images of a source, and coarse meshes of the frames from `span[0]` to `span[1]`."""
+        """Images of a source, and coarse meshes of the frames from `span[0]` to `span[1]`.
+
+        `cfg` has `detail.relief.levels`, `.spacing_mm` and `.face_px`.
+        """
+        levels, spacing_mm, face_px = (
+            cfg[f"detail.relief.{name}"] for name in ("levels", "spacing_mm", "face_px")
+        )
+        topology = FineTopology.of(model, levels, spacing_mm)
         fit = TrackedTake.load(inputs.fit)
         camera, tracked = fit.camera, set(fit.frames[fit.valid].tolist())
         places = rows_of_frames(inputs.meshes, range(span[0], span[1] + 1))

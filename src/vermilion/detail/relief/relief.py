@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -42,6 +44,11 @@ class ReliefSettings:
     noise_floor: float = 1.0
     misplaced_mm: float = 0.5
     iterations: int = 2
+
+    @classmethod
+    def of(cls, cfg: Mapping[str, Any]) -> ReliefSettings:
+        """From a dictionary with the keys `detail.relief.<field>` of the configuration."""
+        return cls(**{item.name: cfg[f"detail.relief.{item.name}"] for item in fields(cls)})
 
 
 def solve_relief(
