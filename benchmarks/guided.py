@@ -28,13 +28,13 @@ import numpy as np
 from benchmarks.common import add_data_argument
 from benchmarks.guided_actors import N_FRAMES, actor_take
 from benchmarks.guided_speed import speed
+from benchmarks.lip_volumes import LipVolumes
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.evaluation.guided_study import PropagationStudy
 from vermilion.faces import ict
 from vermilion.faces.ict_archive import read_ict
 from vermilion.faces.model import FaceModel
 from vermilion.faces.procedural import studio_model
-from vermilion.guided.contact import LipVolumes
 from vermilion.guided.regions import regions_of_face
 from vermilion.guided.suggestion import (
     extreme_frames,

@@ -17,8 +17,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks.common import add_run_arguments
+from benchmarks.drawn_sketch import Hand, drawn_sketch
 from benchmarks.finished_run import FinishedRun
-from vermilion.evaluation.drawn_sketch import Hand, drawn_sketch
 from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import similarity_alignment

@@ -10,7 +10,7 @@ the left one. Prints, for the landmarks, the found contours, the base track and 
   over frames that are drawn open by more than 4 px;
 - `closed`: mean height in px of the other frames, less the drawn.
 
-A mesh's border is the visible one of its opening, by ray casting (`features.visible_opening`). With a
+A mesh's border is the visible one of its opening, by ray casting (`visible_opening`). With a
 second folder of labels of the same frames, the difference of the two is printed as well.
 """
 
@@ -27,10 +27,10 @@ import pandas as pd
 
 from benchmarks.common import add_run_arguments, print_table
 from benchmarks.finished_run import FinishedRun
+from benchmarks.visible_opening import VisibleOpening
 from vermilion.contours.landmark_rings import LandmarkRings
 from vermilion.evaluation.contour_error import distance_to_polyline
 from vermilion.features.vector import FeatureTable
-from vermilion.features.visible_opening import VisibleOpening
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.errors import InputError
 from vermilion.storage.sequences import read_sequence

@@ -76,8 +76,9 @@ class WrinkledActor:
     def _finer(self) -> tuple[sparse.csr_matrix, np.ndarray, np.ndarray]:
         """Finer vertices of the front of the head, their triangles, and which ones these come from."""
         front = self.studio.neutral_mm[self.studio.triangles][:, :, 2].max(axis=1) > 0.0
+        points, everywhere = self.studio.neutral_mm, np.ones(self.studio.n_vertices, dtype=bool)
         finer, fine = loop_subdivision(
-            self.studio.triangles[front], self.studio.n_vertices, _LEVELS
+            points, self.studio.triangles[front], _LEVELS, 0.0, everywhere
         )
         return finer, fine, np.flatnonzero(front)
 

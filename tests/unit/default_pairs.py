@@ -99,7 +99,6 @@ CLASSES = {
 #: Classes with a number as a default that no configuration sets.
 WITHOUT_SECTION = {
     "app.run_progress.RunProgress": "what is known of a run before it says anything",
-    "evaluation.drawn_sketch.Hand": "who draws in an evaluation: 1 px, as the bars say",
     "faces.procedural_layout.Layout": "the mesh of the procedural head, not a setting of users",
     "geometry.registration.Schedule": "by default the search distance stays; scans shrink it",
     "guided.prior_refinement.HandNoise": "how strokes err; a sketch has no configuration",

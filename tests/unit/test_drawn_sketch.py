@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.drawn_sketch import Hand, drawn_sketch, smooth_error
 from tests.unit import guided_mouths as mouths
-from vermilion.evaluation.drawn_sketch import Hand, drawn_sketch, smooth_error
 from vermilion.guided.refinement import RefinementSettings, View
 from vermilion.guided.sketch import CURVE_NAMES
 from vermilion.studio.surface import surface_of

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.lip_volumes import LipVolumes
 from tests.unit import guided_mouths as mouths
 from tests.unit.procedural_mouth import mouth
 from vermilion.correction.lip_crossings import LipCrossings
-from vermilion.guided.contact import LipVolumes
 from vermilion.guided.propagation import LipPropagator
 from vermilion.guided.regions import rim_fade
 from vermilion.guided.suggestion import (

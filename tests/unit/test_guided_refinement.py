@@ -14,7 +14,6 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.refinement import (
-    SMOOTH,
     RefinementSettings,
     SketchRefiner,
     View,
@@ -86,7 +85,9 @@ def test_nothing_outside_the_mouth_region_moves(refiner, base, true):
 def test_the_lips_come_nearer_to_the_truth(base, true):
     camera, side = mouths.camera(), mouths.camera("side", 0.8)
     red = mouths.face().regions["vermilion_upper"] | mouths.face().regions["vermilion_lower"]
-    refiner = SketchRefiner(mouths.regions(), mouths.surface(), settings=SMOOTH)
+    refiner = SketchRefiner(
+        mouths.regions(), mouths.surface(), settings=RefinementSettings(position=0.01)
+    )
     one, two = (
         refiner.refine(base, [(mouths.drawn(true, c, outer=True), c) for c in cameras]).vertices_mm
         for cameras in ((camera,), (camera, side))

@@ -12,7 +12,6 @@ from vermilion.guided.sketch import (
     SketchCurve,
     read_sketch,
     sketch_path,
-    sketch_paths,
     write_sketch,
 )
 from vermilion.storage.errors import InputError
@@ -56,7 +55,6 @@ def test_a_sketch_is_read_as_it_was_written(tmp_path):
         "lower_outer": "near",
     }
     np.testing.assert_array_equal(again.curves["lower_outer"].points_px, LOWER)
-    assert sketch_paths(tmp_path, "face2") == {12: path}
 
 
 def test_a_sketch_that_cannot_be_read_is_not_written(tmp_path):

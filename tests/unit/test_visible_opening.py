@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.lips_on_labels import COLUMNS, DrawnLips, compare, halves
+from benchmarks.visible_opening import VisibleOpening
 from tests.heads import small_tracker
-from vermilion.features.visible_opening import VisibleOpening
 from vermilion.geometry.camera import look_at, pinhole
 from vermilion.storage.errors import InputError
 

@@ -57,29 +57,3 @@ def deformation_gradients(
     degenerate = np.isnan(gradients).any(axis=(-1, -2))
     gradients[degenerate] = np.eye(3)
     return gradients
-
-
-def correction_gradients(
-    coarse: np.ndarray,
-    accurate: np.ndarray,
-    coarse_neutral: np.ndarray,
-    accurate_neutral: np.ndarray,
-    triangles: np.ndarray,
-) -> np.ndarray:
-    """G = H_f D_0 C_f^-1 of Lips16 eq. 1, term by term.
-
-    With **H** resampled onto the topology of **C** the neutrals cancel, and this equals
-    `deformation_gradients(coarse, accurate, triangles)`: a test holds the two together.
-
-    Args:
-        coarse, accurate: (..., V, 3), meshes C_f and H_f.
-        coarse_neutral, accurate_neutral: (V, 3), meshes C_0 and H_0.
-        triangles: (T, 3), of both.
-
-    Returns:
-        (..., T, 3, 3).
-    """
-    expression_h = deformation_gradients(accurate_neutral, accurate, triangles)
-    identity = deformation_gradients(coarse_neutral, accurate_neutral, triangles)
-    expression_c = deformation_gradients(coarse_neutral, coarse, triangles)
-    return expression_h @ identity @ inverse_3x3(expression_c)

@@ -17,26 +17,18 @@ from vermilion.storage.files import atomic_path
 MESH_SUFFIXES = (".obj", ".ply", ".stl")
 
 
-def write_ply(path: str | Path, mesh: Mesh, colours: np.ndarray | None = None) -> None:
-    """Write a binary PLY; `colours` (V, 3) uint8 optional."""
+def write_ply(path: str | Path, mesh: Mesh) -> None:
+    """Write a binary PLY."""
     n_vertices, n_triangles = len(mesh.vertices_mm), len(mesh.triangles)
-    fields = [("xyz", "<f4", 3)]
     header = ["ply", "format binary_little_endian 1.0", "comment unit millimetre"]
     header += [f"element vertex {n_vertices}"] + [f"property float {axis}" for axis in "xyz"]
-    if colours is not None:
-        fields.append(("rgb", "u1", 3))
-        header += [f"property uchar {name}" for name in ("red", "green", "blue")]
     header += [f"element face {n_triangles}", "property list uchar int vertex_indices"]
     header += ["end_header", ""]
-    vertices = np.zeros(n_vertices, dtype=fields)
-    vertices["xyz"] = mesh.vertices_mm
-    if colours is not None:
-        vertices["rgb"] = colours
     faces = np.zeros(n_triangles, dtype=[("count", "u1"), ("ids", "<i4", 3)])
     faces["count"], faces["ids"] = 3, mesh.triangles
     with atomic_path(path) as temporary, open(temporary, "wb") as stream:
         stream.write("\n".join(header).encode("ascii"))
-        stream.write(vertices.tobytes() + faces.tobytes())
+        stream.write(mesh.vertices_mm.astype("<f4").tobytes() + faces.tobytes())
 
 
 def read_mesh(path: str | Path) -> Mesh:

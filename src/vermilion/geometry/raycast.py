@@ -68,26 +68,21 @@ class RayCaster:
             triangle.reshape(shape), barycentric.reshape(*shape, 3), distance.reshape(shape)
         )
 
-    def occluded(
-        self, origins_mm: np.ndarray, directions: np.ndarray, limit_mm: float = np.inf
-    ) -> np.ndarray:
-        """Whether anything lies in the way of rays.
+    def occluded(self, origins_mm: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Whether anything lies in the way of rays: any hit serves, which is twice as quick as the first.
 
         Args:
             origins_mm: (3,) or (..., 3) in the mesh's world, mm.
             directions: (..., 3) unit.
-            limit_mm: how far along the ray.
 
         Returns:
             (...) bool.
         """
-        if not np.isfinite(limit_mm):  # any hit serves, which is twice as quick
-            shape = directions.shape[:-1]
-            origins = np.broadcast_to(origins_mm, directions.shape).reshape(-1, 3)
-            flat = np.ascontiguousarray(directions.reshape(-1, 3), dtype=np.float32)
-            origins = np.ascontiguousarray(origins, dtype=np.float32)
-            return (self._scene.run(origins, flat, query="OCCLUDED") >= 0).reshape(shape)
-        return self.cast(origins_mm, directions).distance_mm < limit_mm
+        shape = directions.shape[:-1]
+        origins = np.broadcast_to(origins_mm, directions.shape).reshape(-1, 3)
+        flat = np.ascontiguousarray(directions.reshape(-1, 3), dtype=np.float32)
+        origins = np.ascontiguousarray(origins, dtype=np.float32)
+        return (self._scene.run(origins, flat, query="OCCLUDED") >= 0).reshape(shape)
 
     def see(self, camera: Camera) -> Hits:
         """One ray through the centre of each pixel, (height, width)."""

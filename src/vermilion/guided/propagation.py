@@ -243,7 +243,7 @@ class LipPropagator:
         for f, mouth in enumerate(corrected):
             mesh[self._mouth] = mouth
             found = separate_lips(mesh, crossings, self._energy)
-            depth[f] = found.after_mm
+            depth[f] = found.depth_mm
             mouth[:] = found.vertices_mm[self._mouth]
         self.integrator.follow(corrected, aligned)
         return depth

@@ -58,10 +58,6 @@ class RefinementSettings:
     samples: int = 40
 
 
-#: Beyond the paper: the lips around a contour go along with it further.
-SMOOTH = RefinementSettings(position=0.01)
-
-
 @dataclass(frozen=True)
 class Refined:
     """A refined frame.
@@ -157,7 +153,6 @@ class SketchRefiner:
         self,
         regions: GuidedRegions,
         surface: LipSurface,
-        still: np.ndarray | None = None,
         crossings: LipCrossings | None = None,
         settings: RefinementSettings | None = None,
     ):
@@ -165,15 +160,13 @@ class SketchRefiner:
 
         Args:
             surface: where contours are looked for (`LipSurface.of_face`, `.of_regions`).
-            still: (s,) vertices that should hardly move; None: those that hang on the inner lips, which
-                are hidden inside the mouth.
             crossings: the lips, to separate where one would pass through the other; None: the paper.
         """
         self.settings = settings or RefinementSettings()
         self.movable = movable_vertices(regions)
         self._surface, self._crossings = surface, crossings
         position = np.full(regions.n_vertices, self.settings.position)
-        position[regions.followers if still is None else still] = self.settings.still
+        position[regions.followers] = self.settings.still  # hidden inside the mouth
         matrix = keeping_matrix(regions, self.movable, position, self.settings.regularity)
         self._energy = ConstrainedEnergy(CholeskyFactor(matrix), self.movable, regions.n_vertices)
 

@@ -78,13 +78,6 @@ def sketch_path(labels: str | Path, camera: str, frame: int) -> Path:
     return Path(labels) / "sketches" / camera / f"{frame:06d}.json"
 
 
-def sketch_paths(labels: str | Path, camera: str) -> dict[int, Path]:
-    """Frame -> sketch of one camera, ascending; empty where there are none."""
-    folder = Path(labels) / "sketches" / camera
-    found = {int(p.stem): p for p in folder.glob("*.json") if p.stem.isdigit()}
-    return dict(sorted(found.items()))
-
-
 def write_sketch(path: str | Path, sketch: Sketch) -> None:
     """Check a sketch and write it, whole or not at all. Raises InputError as `read_sketch`."""
     content = {

@@ -15,7 +15,7 @@ import numpy as np
 from vermilion.landmarks.detector import MAX_FACES, Landmarks, apart, most_prominent
 from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_features
 from vermilion.landmarks.locate import FaceLocator
-from vermilion.landmarks.scheme import N_LANDMARKS, face_size_px
+from vermilion.landmarks.scheme import face_size_px
 from vermilion.landmarks.sets import IBUG66
 from vermilion.storage.arrays import format_version, read_arrays, write_arrays
 from vermilion.storage.errors import ModelFileError
@@ -24,7 +24,6 @@ FORMAT_VERSION = 1
 CELLS = 4
 #: Pixels between the cells of a patch, and blur, in the upright image.
 SPACING_PX, BLUR_PX = 4.0, 1.8
-N_FEATURES = N_LANDMARKS * CELLS * CELLS * 8
 
 
 def stage_sizes(n_stages: int) -> tuple[int, ...]:
@@ -93,7 +92,7 @@ class DescentDetector:
 
     Attributes:
         mean: (66, 2) mean shape, size 1 about the origin of its bounding box.
-        steps: (S, N_FEATURES + 1, 132) float32: each stage's regression, the offset last.
+        steps: (S, 66 * 128 + 1, 132) float32: each stage's regression, the offset last.
         sureness: (66, 129) how near a point is, from its patch; the offset last.
         locator: finds where to start.
         found_threshold: least mean confidence.

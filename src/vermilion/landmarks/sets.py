@@ -27,7 +27,6 @@ class LandmarkSet:
         deviations: name of the group -> (kind of noise that the configuration gives a deviation for,
             factor on it). Points of a dense group err together: the factor keeps the group's weight
             that of the fewer points of `ibug66`.
-        eye_right, eye_left: (n,) closed loops along the lids.
         lip_outer, lip_inner: (n,) closed loops from the right corner over the upper lip.
         outer_corners, inner_corners: (2,) right and left corner of the mouth on either loop.
         eye_corners: (2,) outer corner of the right and the left eye.
@@ -39,8 +38,6 @@ class LandmarkSet:
     n_points: int
     groups: Mapping[str, np.ndarray]
     deviations: Mapping[str, tuple[str, float]]
-    eye_right: np.ndarray
-    eye_left: np.ndarray
     lip_outer: np.ndarray
     lip_inner: np.ndarray
     outer_corners: np.ndarray
@@ -117,8 +114,6 @@ def _ibug66() -> LandmarkSet:
         n_points=scheme.N_LANDMARKS,
         groups=groups,
         deviations={name: (name, 1.0) for name in groups},
-        eye_right=scheme.EYE_RIGHT,
-        eye_left=scheme.EYE_LEFT,
         lip_outer=scheme.LIP_OUTER,
         lip_inner=scheme.LIP_INNER,
         outer_corners=corners,
@@ -215,8 +210,6 @@ def _mediapipe478() -> LandmarkSet:
             name: (kinds.get(name, name), float(np.sqrt(len(points) / few[name])))
             for name, points in groups.items()
         },
-        eye_right=np.array(_EYE_RIGHT),
-        eye_left=mirror[np.array(_EYE_RIGHT)],
         lip_outer=rings[0],
         lip_inner=rings[-1],
         outer_corners=rings[0][[0, len(rings[0]) // 2]],

@@ -76,14 +76,12 @@ class Carried:
     """The neutral's image in one camera of a frame.
 
     Attributes:
-        sight: of the frame's mesh.
         seen: (V,) bool, vertices that the camera sees in both frames.
         comparison: None where it sees nothing of the mesh.
         motion: what is left to move, at the vertices, px of the compared size.
         px_per_mm: (V,) across the line of sight.
     """
 
-    sight: Sight
     seen: np.ndarray
     comparison: Comparison | None
     motion: Motion
@@ -127,7 +125,7 @@ def carry(
             motion = motion_at(comparison, now, before, settings.min_agreement)
         depth = view.camera.to_camera(vertices_mm)[:, 2]
         px_per_mm = view.camera.calibration[0, 0] / np.maximum(depth, 1e-6)
-        found[name] = Carried(now, now.visible & before.visible, comparison, motion, px_per_mm)
+        found[name] = Carried(now.visible & before.visible, comparison, motion, px_per_mm)
     return found
 
 

@@ -17,8 +17,7 @@ from vermilion.faces.contours import (
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import connected_parts, unique_edges
 from vermilion.geometry.sparse import CholeskyFactor, cotangent_laplacian
-
-SKIN, MOUTH, TEETH, EYE = range(4)
+from vermilion.studio.kernels import EYE, MOUTH, SKIN, TEETH
 
 #: Reach of the smoothing of the vermilion border, against stairs along the mesh's edges (mm).
 BORDER_SMOOTHING_MM = 1.2

@@ -19,7 +19,7 @@ from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.polylines import lengths_along
 from vermilion.geometry.surface_points import SurfacePoints
-from vermilion.landmarks.sets import IBUG66, LandmarkSet, set_of
+from vermilion.landmarks.sets import LandmarkSet, set_of
 from vermilion.storage.arrays import read_arrays, write_arrays
 
 _HIDDEN = ("mouth_inner", "teeth", "eyes")  # regions that no landmark lies on
@@ -47,13 +47,6 @@ class LandmarkPlaces:
     def of(self, field: np.ndarray) -> np.ndarray:
         """Values (..., N, d) float64 of a field (..., V, d) on the model's vertices; zero where unknown."""
         return np.where(self.known[:, None], self.points.sample(field, self.triangles), 0.0)
-
-    @classmethod
-    def of_ibug66(cls, model: FaceModel) -> LandmarkPlaces:
-        """The vertices that the model names."""
-        return cls(
-            IBUG66, SurfacePoints.at_vertices(model.landmarks, model.triangles), model.triangles
-        )
 
     def arrays(self) -> dict[str, np.ndarray]:
         """As arrays, from which `from_arrays` makes the same: triangle (N,), barycentric (N, 3)."""

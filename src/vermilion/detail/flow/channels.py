@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 
 #: Maps of an image, each of three colours: f, f_x, f_y, f_xx, f_xy, f_yy.
-N_MAPS = 6
 _BLUR_PX = 0.7
 
 
 def channels(image: np.ndarray) -> np.ndarray:
-    """Channels (h, w, 18) float32 of `image` (h, w, 3), display values: `N_MAPS` times RGB."""
+    """Channels (h, w, 18) float32 of `image` (h, w, 3), display values: six times RGB."""
     smooth = cv2.GaussianBlur(image, (0, 0), _BLUR_PX, borderType=cv2.BORDER_REPLICATE)
     x, y = _across(smooth), _down(smooth)
     return np.concatenate([smooth, x, y, _across(x), _down(x), _down(y)], axis=2)

@@ -7,42 +7,23 @@ from scipy import sparse
 
 
 def loop_subdivision(
-    triangles: np.ndarray, n_vertices: int, levels: int
-) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """Matrix (V', V) from coarse to fine vertices, and the fine triangles (4^levels T, 3) int32.
-
-    Loop 1987 with Warren's weights. Border vertices follow the border's cubic spline; vertices without
-    a triangle do not move. The first V fine vertices are the coarse ones, moved.
-
-    Args:
-        triangles: (T, 3).
-        n_vertices: V.
-        levels: subdivisions.
-    """
-    total = sparse.identity(n_vertices, format="csr")
-    for _ in range(levels):
-        step, triangles = _once(triangles, total.shape[0], None)
-        total = step @ total
-    return total.tocsr(), triangles
-
-
-def loop_subdivision_to(
     points_mm: np.ndarray,
     triangles: np.ndarray,
     levels: int,
     longest_mm: float,
     wanted: np.ndarray,
 ) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """The same where triangles are large: matrix (V', V) and fine triangles (T', 3) int32.
+    """Matrix (V', V) from coarse to fine vertices, and the fine triangles (T', 3) int32.
 
-    A triangle with an edge of more than a length becomes four, level by level; its neighbours become two or
+    Loop 1987 with Warren's weights. Border vertices follow the border's cubic spline; vertices without
+    a triangle do not move. The first V fine vertices are the coarse ones, moved. A triangle with an edge of more than a length becomes four, level by level; its neighbours become two or
     three. A vertex moves as Loop has it where all of its edges are halved, and stays elsewhere.
 
     Args:
         points_mm: (V, 3) of which lengths are taken.
         triangles: (T, 3).
         levels: most subdivisions.
-        longest_mm: no edge should be longer.
+        longest_mm: no edge should be longer; 0: all triangles are divided.
         wanted: (V,) bool; edges beside other vertices may be.
     """
     total = sparse.identity(len(points_mm), format="csr")
@@ -61,19 +42,17 @@ def loop_subdivision_to(
 
 
 def _once(
-    triangles: np.ndarray, n: int, halved: np.ndarray | None
+    triangles: np.ndarray, n: int, halved: np.ndarray
 ) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """One level; `halved` (T, 3) bool for edges 01, 12, 20 of triangles, each of one; None for all."""
+    """One level; `halved` (T, 3) bool for edges 01, 12, 20 of triangles, each of one."""
     corners = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     opposite = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])
     edges, of, count = np.unique(
         np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True
     )
     of, inner = of.reshape(-1), count > 1
-    split = np.ones(len(edges), dtype=bool)
-    if halved is not None:
-        split[:] = False
-        split[of[halved.T.ravel()]] = True
+    split = np.zeros(len(edges), dtype=bool)
+    split[of[halved.T.ravel()]] = True
     # New vertices: 3/8 of the ends and 1/8 of what lies opposite; the middle, on the border.
     m = len(edges)
     ends = np.where(inner, 0.375, 0.5)

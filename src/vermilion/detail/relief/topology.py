@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.appearance.samples import skin
-from vermilion.detail.relief.subdivision import loop_subdivision_to
+from vermilion.detail.relief.subdivision import loop_subdivision
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import boundary_edges, submesh, unique_edges
 
@@ -51,7 +51,7 @@ class FineTopology:
             spacing_mm: edges of the skin that are longer are halved.
         """
         coarse = skin(model, _BORDER_RINGS)
-        finer, triangles = loop_subdivision_to(
+        finer, triangles = loop_subdivision(
             model.neutral_mm, model.triangles, levels, spacing_mm, coarse
         )
         keep = finer @ coarse.astype(float) > 0.999
