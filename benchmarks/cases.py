@@ -30,7 +30,7 @@ from vermilion.imaging.images import (
 )
 from vermilion.imaging.video import VideoReader
 from vermilion.landmarks.faces import SeenFaces, find_faces
-from vermilion.landmarks.following import FaceChoice, FollowedFace, follow
+from vermilion.landmarks.following import FaceChoice, FollowedFace, follow_face
 from vermilion.landmarks.mediapipe import MediapipeDetector
 from vermilion.storage.errors import InputError
 
@@ -129,7 +129,7 @@ def followed(path: Path, environment: str, face: Sequence[float] = ()) -> Follow
             detector.landmark_set,
         )
         finds.save(Path(folder) / "faces.npz")
-        return follow(SeenFaces.load([Path(folder) / "faces.npz"]), choice)
+        return follow_face(SeenFaces.load([Path(folder) / "faces.npz"]), choice)
 
 
 def two_faces(cases: Path, environment: str) -> Finding:

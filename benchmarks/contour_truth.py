@@ -30,10 +30,10 @@ from benchmarks.contours import FoundContours, search_from_landmarks
 from benchmarks.finished_run import FinishedRun
 from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.detector import ContourDetector
-from vermilion.contours.labels import label_paths, read_label
+from vermilion.contours.labels import label_paths, read_contour_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
-from vermilion.contours.training import LabelledFrame, TrainingSettings, train_detector
+from vermilion.contours.training import ContourTrainingSettings, LabelledFrame, train_detector
 from vermilion.evaluation.contour_error import distance_to_polyline
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import ContourSampler
@@ -81,7 +81,9 @@ class Scene:
         images, track = run.images(), run.landmarks()
         loops = true_contours(run.model("studio"), run.true_mm(), camera)
         labels = {
-            f: LabelledFrame(images.read(camera.name, f), track.points_px[f], read_label(path), f)
+            f: LabelledFrame(
+                images.read(camera.name, f), track.points_px[f], read_contour_label(path), f
+            )
             for f, path in label_paths(run.capture, camera.name).items()
         }
         coarse = None
@@ -175,7 +177,7 @@ def detectors_of(scene: Scene, rings: dict[int, Rings]) -> dict[str, ContourDete
         if near_track is not None:
             detectors["track"] = near_track
     if labelled:
-        detectors["boosted"] = train_detector(labelled, TrainingSettings())
+        detectors["boosted"] = train_detector(labelled, ContourTrainingSettings())
     return detectors
 
 

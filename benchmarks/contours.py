@@ -28,11 +28,11 @@ from vermilion.contours import training
 from vermilion.contours.channels import CHANNELS, image_channels, integral_images
 from vermilion.contours.curves import loop_spline
 from vermilion.contours.labelled_frames import LabelledFrame
-from vermilion.contours.labels import CONTOURS, label_paths, read_label
+from vermilion.contours.labels import CONTOURS, label_paths, read_contour_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
-from vermilion.contours.training import TrainingSettings, train_detector
+from vermilion.contours.training import ContourTrainingSettings, train_detector
 from vermilion.features.search import SearchSettings, find_inner, find_outer
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.networks import NetworkDetector
@@ -47,7 +47,7 @@ class PeerDetector:
 
     pool: object
     models: dict[str, HistGradientBoostingClassifier]
-    settings: TrainingSettings
+    settings: ContourTrainingSettings
 
     def likelihood(self, linear_rgb, landmarks_px):
         """The (inner, outer) maps (h, w) of an image (h, w, 3) with landmarks (66, 2) px."""
@@ -63,7 +63,7 @@ class PeerDetector:
         return maps
 
 
-def train_peer(frames, settings: TrainingSettings, n_features: int = 300) -> PeerDetector:
+def train_peer(frames, settings: ContourTrainingSettings, n_features: int = 300) -> PeerDetector:
     """Train it on labelled frames."""
     random = np.random.default_rng(0)
     examples = [e for frame in frames for e in training._examples(frame, settings, random)]
@@ -131,7 +131,7 @@ def labelled_frames(data: Path) -> dict[int, LabelledFrame]:
     for number, path in label_paths(capture, "cam").items():
         image = source.read("cam", number)
         frames[number] = LabelledFrame(
-            image, landmarks.detect(image).points_px, read_label(path), number
+            image, landmarks.detect(image).points_px, read_contour_label(path), number
         )
     return frames
 
@@ -145,14 +145,14 @@ def run(arguments: argparse.Namespace) -> None:
     """Measure and print."""
     frames = labelled_frames(arguments.data)
     train = [frame for number, frame in frames.items() if number not in HELD_OUT]
-    settings = TrainingSettings()
+    settings = ContourTrainingSettings()
     makers = {
         "landmarks": lambda: LandmarkRidgeDetector(edge_weight=0.0),
         "colour": LandmarkRidgeDetector,
         "boosted": lambda: train_detector(train, settings),
         "scikit-learn": lambda: train_peer(train, settings),
     }
-    train_detector(train[:1], TrainingSettings(variants=1, n_features=64))  # compiles
+    train_detector(train[:1], ContourTrainingSettings(variants=1, n_features=64))  # compiles
     rows = []
     for name, make in makers.items():
         fitted = timed(make)

@@ -12,7 +12,7 @@ from vermilion.geometry.polylines import evenly_along
 from vermilion.guided.curves import first_self_crossing
 from vermilion.guided.sketch import Sketch, SketchCurve
 from vermilion.studio.labels import lip_contours
-from vermilion.studio.surface import Surface
+from vermilion.studio.surface import StudioSurface
 
 #: Points of a stroke, and its parts over which the hand's error is about the same.
 N_POINTS, N_SWAYS = 25, 4
@@ -35,7 +35,7 @@ class Hand:
 
 def drawn_sketch(
     face: FaceModel,
-    surface: Surface,
+    surface: StudioSurface,
     vertices_mm: np.ndarray,
     camera: Camera,
     frame: int,

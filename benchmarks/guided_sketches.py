@@ -28,7 +28,7 @@ from vermilion.geometry.surface_points import SurfacePoints
 from vermilion.guided.propagation import LipPropagator
 from vermilion.guided.refinement import SketchRefiner
 from vermilion.guided.regions import regions_of_face
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.guided.suggestion import (
     extreme_frames,
     mouth_deformation,
@@ -80,7 +80,7 @@ class SketchTrial:
             moved = [self._motion(a, b) for a, b in zip(true, base, strict=True)]
             self.drawn = np.stack([m.apply(v) for m, v in zip(moved, vertices, strict=True)])
         self.deformation = mouth_deformation(self.base, self.neutral, self.regions, self.stable)
-        self.refiner = SketchRefiner(self.regions, LipSurface.of_face(self.face, self.regions))
+        self.refiner = SketchRefiner(self.regions, ContourSurface.of_face(self.face, self.regions))
         self._surface, self._hand = surface_of(self.studio), Hand(outer=outer)
         self._before = self.motion_error(self.base)
 

@@ -19,9 +19,14 @@ from vermilion.geometry.deformation_gradients import deformation_gradients
 from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.dirichlet import gradient_divergence
 from vermilion.guided.propagation import LipPropagator
-from vermilion.guided.refinement import RefinementSettings, SketchRefiner, View, keeping_matrix
+from vermilion.guided.refinement import (
+    RefinementSettings,
+    SketchRefiner,
+    SketchView,
+    keeping_matrix,
+)
 from vermilion.guided.regions import GuidedRegions, regions_of_face, regions_of_triangles
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.guided.sketch import Sketch, SketchCurve
 
 N_TRUSTED, N_PREDICTED, N_TRAINING = 19_315, 6_000, 11
@@ -116,7 +121,7 @@ def sketch_speed() -> None:
     """A sketch solve on a head of 40,000 vertices, and the same with a system factored each time."""
     face = studio_model(0.54, 2, None)
     regions = regions_of_face(face)
-    surface = LipSurface.of_face(face, regions)
+    surface = ContourSurface.of_face(face, regions)
     index = [face.expression_names.index(n) for n in ("jawOpen", "mouthFunnel", "mouthSmile_L")]
     weights = np.zeros((2, face.n_expressions))
     weights[:, index] = [[0.3, 0.0, 0.0], [0.3, 0.4, 0.4]]
@@ -156,7 +161,7 @@ def refactored(refiner: SketchRefiner, regions, surface, base, sketch, view) -> 
     keeping = keeping_matrix(regions, refiner.movable, position, settings.regularity)
     row = np.full(len(base), -1)
     row[refiner.movable] = np.arange(len(refiner.movable))
-    ready, current = View.of(sketch, view, settings), base.copy()
+    ready, current = SketchView.of(sketch, view, settings), base.copy()
     for _ in range(settings.iterations):
         made = refiner._view_constraints(current, ready)
         at = row[made.vertices]
@@ -183,12 +188,12 @@ def camera_of(face: FaceModel, mouth_px: float = 120.0) -> Camera:
     return pinhole("cam", 600.0 * mouth_px / np.ptp(loop[:, 0]), 640, 640, pose)
 
 
-def sketch_of(vertices: np.ndarray, surface: LipSurface, view: Camera) -> Sketch:
+def sketch_of(vertices: np.ndarray, surface: ContourSurface, view: Camera) -> Sketch:
     """Both inner contours of an open mouth: the outermost silhouette in every other column."""
     flat = {
         n: SketchCurve(np.array([[0.0, 0.0], [1.0, 0.0]])) for n in ("upper_inner", "lower_inner")
     }
-    ready = View.of(Sketch("cam", 0, (640, 640), flat), view, RefinementSettings())
+    ready = SketchView.of(Sketch("cam", 0, (640, 640), flat), view, RefinementSettings())
     strokes = {}
     for name, segments in ready.contours(vertices, surface).items():
         share = np.linspace(0.0, 1.0, 9)[:, None, None]

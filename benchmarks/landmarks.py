@@ -1,6 +1,6 @@
 """Landmark error, raw and flow-corrected, and CPU time of landmarks and of the fit (Mono13 5, 6).
 
-Truth is used to measure alone. Fields of `CorrectionSettings` are set by `--set FIELD=NUMBER`.
+Truth is used to measure alone. Fields of `LandmarkCorrectionSettings` are set by `--set FIELD=NUMBER`.
 
 Expressive frames are the eleven whose landmarks moved most in the face since the first frame, as
 many as Mono13's table 1 has a sequence. The detector and a modeller name different places, so there
@@ -31,8 +31,8 @@ from benchmarks.finished_run import FinishedRun
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.frames import open_frames
-from vermilion.landmarks.correct_key_frames import settle
-from vermilion.landmarks.correction import CorrectionSettings, correct
+from vermilion.landmarks.correct_key_frames import correct_key_frames
+from vermilion.landmarks.correction import LandmarkCorrectionSettings, correct_landmarks
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import find_key_frames, without_offset
@@ -143,7 +143,7 @@ def true_points(
 
 
 def measure(
-    run: FinishedRun, camera: Camera, detected: LandmarkTrack, settings: CorrectionSettings
+    run: FinishedRun, camera: Camera, detected: LandmarkTrack, settings: LandmarkCorrectionSettings
 ) -> None:
     """Correct the landmarks of a take and print their errors against both truths."""
     material, marked = true_points(run, camera, detected)
@@ -156,7 +156,7 @@ def measure(
 
     def key_frames(given: dict[int, np.ndarray]):
         unbiased = without_offset(detected, given)
-        return settle(grey, unbiased, find_key_frames(grey, unbiased, given), settings)
+        return correct_key_frames(grey, unbiased, find_key_frames(grey, unbiased, given), settings)
 
     for frame in detected.frames:
         grey(int(frame))
@@ -165,7 +165,9 @@ def measure(
         ("marked", marked, {int(detected.frames[0]): marked[0]}),
     ):
         keys = timed(partial(key_frames, given))
-        flow = timed(partial(correct, grey, detected, keys.result, detected.frames, settings))
+        flow = timed(
+            partial(correct_landmarks, grey, detected, keys.result, detected.frames, settings)
+        )
         print_errors(kind, true_px, detected.points_px, flow.result[0].points_px, frames)
         print(
             f"  {len(keys.result.frames)} key frames; CPU ms a frame: key frames "
@@ -220,8 +222,8 @@ def time_fit(run: FinishedRun, track: LandmarkTrack) -> None:
 def field_of_correction(text: str) -> tuple[str, float]:
     """Name and value of FIELD=NUMBER."""
     name, _, value = text.partition("=")
-    if name not in CorrectionSettings.__dataclass_fields__:
-        known = ", ".join(CorrectionSettings.__dataclass_fields__)
+    if name not in LandmarkCorrectionSettings.__dataclass_fields__:
+        known = ", ".join(LandmarkCorrectionSettings.__dataclass_fields__)
         raise argparse.ArgumentTypeError(f"no field {name!r}; there are {known}")
     return name, float(value)
 
@@ -238,7 +240,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FIELD=NUMBER",
-        help="a field of CorrectionSettings",
+        help="a field of LandmarkCorrectionSettings",
     )
 
 
@@ -256,7 +258,7 @@ def run(arguments: argparse.Namespace) -> None:
         return
     take = FinishedRun.of(arguments)
     camera, detected = take.cameras()[arguments.camera], take.landmarks(raw=True)
-    measure(take, camera, detected, CorrectionSettings(**dict(arguments.set)))
+    measure(take, camera, detected, LandmarkCorrectionSettings(**dict(arguments.set)))
     if arguments.networks:
         source, frames = take.images(inpainted=True), detected.frames[:20]
         time_networks(arguments.networks, [source.read(camera.name, int(f)) for f in frames])

@@ -29,7 +29,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, triangle_normals
 from vermilion.multiview.cloud import fuse, near_mesh, screened_poisson
-from vermilion.multiview.files import read_views
+from vermilion.multiview.files import read_landmark_views
 from vermilion.multiview.neutral import stereo_cloud
 from vermilion.multiview.nonrigid import register_to_cloud
 from vermilion.multiview.solver import ThinPlate
@@ -57,7 +57,7 @@ class Problem:
         settings, stereo = config.neutral, StereoSettings(**config.stereo.model_dump())
         images = ImageSettings(**config.images.model_dump())
         frame = MultiviewImages(run.images(), cameras, images).load(0)
-        views = read_views(run.folder / "landmarks" / "views_neutral.npz", frame.views)
+        views = read_landmark_views(run.folder / "landmarks" / "views_neutral.npz", frame.views)
         landmarks = triangulate_landmarks(
             cameras, *views, min_confidence=settings.min_confidence,
             max_distance_mm=settings.landmark_distance_mm,

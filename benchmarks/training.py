@@ -14,7 +14,7 @@ from sklearn.kernel_ridge import KernelRidge
 from sklearn.model_selection import GroupKFold
 
 from benchmarks.common import peak_gb, timed
-from vermilion.regression.cross_validation import clips_of
+from vermilion.regression.cross_validation import clips_of_rows
 from vermilion.regression.training import Selection, train
 from vermilion.regression.training_set import TrainingSet
 
@@ -48,7 +48,7 @@ def paper_sized_data() -> TrainingSet:
 
 def one_peer_fit(data: TrainingSet, selection: Selection) -> float:
     """Score of scikit-learn's kernel ridge regression on the first fold."""
-    clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
+    clips = clips_of_rows(data.sequences, selection.clip_frames, selection.folds)
     rows, held = next(GroupKFold(selection.folds).split(clips, groups=clips))
     peer = KernelRidge(alpha=0.1, kernel="rbf", gamma=0.002)
     peer.fit(data.features[rows], data.layers[rows])

@@ -51,7 +51,7 @@ from vermilion.geometry.alignment import align_frames, similarity_alignment
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, vertex_normals
 from vermilion.regression.model import LipModel, load_model
-from vermilion.scan.landmarks import ScanLandmarks, read_landmarks
+from vermilion.scan.landmarks import ScanLandmarks, read_scan_landmarks
 from vermilion.scan.personal import personal_model
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
@@ -116,7 +116,7 @@ def truth_of(
     )
     neutral = np.load(run.truth / "neutral_mm.npy").astype(np.float64)
     if landmarks is not None:
-        return UnseenSubjectTruth(neutral, vertices, triangles, read_landmarks(landmarks))
+        return UnseenSubjectTruth(neutral, vertices, triangles, read_scan_landmarks(landmarks))
     ids = run.model("studio").landmarks
     if ids.max() >= len(neutral):
         raise InputError(

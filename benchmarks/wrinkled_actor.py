@@ -29,7 +29,7 @@ from vermilion.studio.look import look_of
 from vermilion.studio.render import Scene, render
 from vermilion.studio.rig import RigSettings, video_camera
 from vermilion.studio.sensor import sensor_noise
-from vermilion.studio.surface import Surface, surface_of
+from vermilion.studio.surface import StudioSurface, surface_of
 
 #: Frames of the neutral, before any fold comes.
 STILL = 10
@@ -168,7 +168,7 @@ class WrinkledActor:
         material = coarse.material[front]
         for _ in range(_LEVELS):
             material = np.repeat(material, 4)
-        surface = Surface(
+        surface = StudioSurface(
             solid_mm=(finer @ coarse.solid_mm).astype(np.float32),
             lip_mm=(finer @ coarse.lip_mm).astype(np.float32),
             inside_mm=(finer @ coarse.inside_mm).astype(np.float32),

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from tests.faults.case import Case, check, parametrized
-from vermilion.contours.labels import check_label as check_contours
-from vermilion.contours.labels import read_label as read_contours
+from vermilion.contours.labels import check_contour_label as check_contours
+from vermilion.contours.labels import read_contour_label as read_contours
 from vermilion.geometry.camera import pinhole
-from vermilion.guided.inputs import read_views
-from vermilion.landmarks.labels import labels_by_frame, read_label
+from vermilion.guided.inputs import read_sketch_views
+from vermilion.landmarks.labels import labels_by_frame, read_landmark_label
 
 SIZE = (640, 480)
 CAMERAS = {"face2": pinhole("face2", 900.0, *SIZE), "face3": pinhole("face3", 900.0, *SIZE)}
@@ -65,7 +65,7 @@ def landmark_label(path: Path):
 
 
 def sketch_view(path: Path):
-    return read_views([path], CAMERAS, 10)
+    return read_sketch_views([path], CAMERAS, 10)
 
 
 KINDS = {
@@ -216,4 +216,8 @@ def test_label(case, seed, tmp_path):
 def test_a_label_named_by_no_number_is_refused(tmp_path):
     path = tmp_path / "first.json"
     path.write_text(json.dumps(landmarks()))
-    check(Case("named", lambda folder, rng: path, read_label, "named by its frame"), 1, tmp_path)
+    check(
+        Case("named", lambda folder, rng: path, read_landmark_label, "named by its frame"),
+        1,
+        tmp_path,
+    )

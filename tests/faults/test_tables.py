@@ -9,7 +9,7 @@ import numpy as np
 from tests.faults.case import Case, check, parametrized
 from vermilion.config.takes import read_takes
 from vermilion.landmarks.table import read_landmark_csv
-from vermilion.scan.landmarks import read_landmarks
+from vermilion.scan.landmarks import read_scan_landmarks
 from vermilion.storage.errors import ConfigurationError
 from vermilion.storage.tables import read_table
 from vermilion.studio.live_link import read_live_link
@@ -149,12 +149,12 @@ CASES = [
     Case("curves: byte order mark", file("a.csv", CURVES.encode("utf-8-sig")), curves,
          right=lambda weights: np.allclose(weights, 0.5)),
     Case("curves: infinite", file("a.csv", CURVES.replace("0.5", "inf")), curves, "finite"),
-    Case("scan: no z", file("a.tsv", SCAN.replace("\tz", "")), read_landmarks, "columns|'z'"),
-    Case("scan: words", file("a.tsv", SCAN.replace("4\t16", "left\t16")), read_landmarks, "number"),
-    Case("scan: NaN", file("a.tsv", SCAN.replace("4\t16", "\t16")), read_landmarks, "number"),
-    Case("scan: number twice", file("a.tsv", SCAN + "3\t0\t0\t0\n"), read_landmarks, "twice"),
-    Case("scan: fractions", file("a.tsv", SCAN.replace("\n3\t", "\n3.5\t")), read_landmarks, "3.5"),
-    Case("scan: CRLF", file("a.tsv", SCAN.replace("\n", "\r\n")), read_landmarks,
+    Case("scan: no z", file("a.tsv", SCAN.replace("\tz", "")), read_scan_landmarks, "columns|'z'"),
+    Case("scan: words", file("a.tsv", SCAN.replace("4\t16", "left\t16")), read_scan_landmarks, "number"),
+    Case("scan: NaN", file("a.tsv", SCAN.replace("4\t16", "\t16")), read_scan_landmarks, "number"),
+    Case("scan: number twice", file("a.tsv", SCAN + "3\t0\t0\t0\n"), read_scan_landmarks, "twice"),
+    Case("scan: fractions", file("a.tsv", SCAN.replace("\n3\t", "\n3.5\t")), read_scan_landmarks, "3.5"),
+    Case("scan: CRLF", file("a.tsv", SCAN.replace("\n", "\r\n")), read_scan_landmarks,
          right=lambda found: found.known.sum() == 8),
     Case("results: column missing", file("q.tsv", QUALITY.replace("valid", "good")), quality, "valid"),
     Case("results: empty", file("q.tsv", ""), quality, "unreadable table"),

@@ -22,7 +22,7 @@ from vermilion.geometry.mesh_files import read_polygons
 from vermilion.geometry.polygons import Polygons
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
-from vermilion.scan.landmarks import ScanLandmarks, write_landmarks
+from vermilion.scan.landmarks import ScanLandmarks, write_scan_landmarks
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
 from vermilion.tracking.result import Identity, TrackedTake
@@ -174,7 +174,9 @@ def own_head(take):
     seams = np.where(studio.neutral_mm[polygons.corners, 0] < 0, studio.n_vertices, 0)
     uv = np.concatenate([0.5 * studio.uv, 0.5 * studio.uv + 0.5])
     write_obj(root / "own_head.obj", vertices, polygons, uv, polygons.corners + seams)
-    write_landmarks(root / "marks.tsv", ScanLandmarks(vertices[studio.landmarks], np.zeros(66)))
+    write_scan_landmarks(
+        root / "marks.tsv", ScanLandmarks(vertices[studio.landmarks], np.zeros(66))
+    )
     run_script(
         "apply/export_head",
         wildcards={"subject": "s1"},

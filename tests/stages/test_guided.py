@@ -19,9 +19,9 @@ from vermilion.geometry.camera import write_cameras
 from vermilion.geometry.mesh import Mesh, adjacency
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.geometry.polygons import Polygons
-from vermilion.guided.inputs import read_views
+from vermilion.guided.inputs import read_sketch_views
 from vermilion.guided.refined_frame import RefinedFrame
-from vermilion.guided.refinement import RefinementSettings, View
+from vermilion.guided.refinement import RefinementSettings, SketchView
 from vermilion.guided.sketch import write_sketch
 from vermilion.imaging.images import read_image, write_srgb8
 from vermilion.storage.errors import InputError
@@ -178,7 +178,7 @@ def corrected(take, meshes):
 
 def off_px(mesh, sketch):
     """Mean distance (px) of a mesh's contours from a sketch."""
-    view = View.of(sketch, CAMERA, RefinementSettings())
+    view = SketchView.of(sketch, CAMERA, RefinementSettings())
     found = view.contours(mesh.astype(float), mouths.surface())
     return np.concatenate(
         [found[name].nearest(view.samples[name])[1] for name in view.samples]
@@ -295,10 +295,10 @@ def test_what_a_person_gave_is_checked(take):
     path = take / "wrong" / "side" / "000003.json"
     write_sketch(path, replace(sketch, camera="side"))
     with pytest.raises(InputError, match="one of the take's cameras: cam"):
-        read_views([path], {"cam": CAMERA}, 3)
+        read_sketch_views([path], {"cam": CAMERA}, 3)
     write_sketch(path, sketch)
     with pytest.raises(InputError, match="expected camera side, frame 3, as the file is named"):
-        read_views([path], {"cam": CAMERA}, 3)
+        read_sketch_views([path], {"cam": CAMERA}, 3)
     sculpt = take / "wrong" / "000003.ply"
     write_ply(sculpt, Mesh(np.zeros((4, 3)), np.array([[0, 1, 2]], dtype=np.int32)))
     with pytest.raises(InputError, match="a sculpt of 4 vertices and 1 triangles"):

@@ -47,7 +47,7 @@ CLASSES = {
             "reach": "contours.detector.track.inner_reach",
         },
     ),
-    "contours.training.TrainingSettings": Pair(
+    "contours.training.ContourTrainingSettings": Pair(
         ("contours.detector",), {"n_features": "contours.detector.features"}
     ),
     "detail.flow.deformation.DeformationSettings": Pair(("detail.deformation",)),
@@ -62,7 +62,7 @@ CLASSES = {
     "inpaint.frame.InpaintInputs": Pair(("inpaint.composite", "inpaint.domain", "inpaint.shading")),
     "inpaint.opening.OpeningSettings": Pair(("inpaint.opening",)),
     "inpaint.shading.ShadingSettings": Pair(("inpaint.shading",)),
-    "landmarks.correction.CorrectionSettings": Pair(
+    "landmarks.correction.LandmarkCorrectionSettings": Pair(
         ("landmarks.correction",),
         unset={"fill_confidence": "confidence of a landmark that no frame detected"},
     ),
@@ -75,7 +75,7 @@ CLASSES = {
     ),
     "landmarks.key_frames.KeyFrameSettings": Pair(("landmarks.key_frames",)),
     "landmarks.networks.NetworkSettings": Pair(("landmarks.networks",)),
-    "landmarks.training.TrainingSettings": Pair(("landmarks.training",)),
+    "landmarks.training.LandmarkTrainingSettings": Pair(("landmarks.training",)),
     "multiview.refine.FrameMatchSettings": Pair(("multiview.refine",)),
     "regression.training.Selection": Pair(("training",)),
     "studio.render.Scene": Pair(("studio",)),

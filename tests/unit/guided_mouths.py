@@ -12,7 +12,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.faces.procedural import studio_model
 from vermilion.geometry.camera import Camera, look_at, pinhole
 from vermilion.guided.regions import GuidedRegions, regions_of_face
-from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
+from vermilion.guided.silhouette import ContourSurface, Segments, inner_silhouettes, outer_contours
 from vermilion.guided.sketch import Sketch, SketchCurve
 
 IMAGE_PX = (640, 640)
@@ -41,8 +41,8 @@ def small_regions() -> GuidedRegions:
 
 
 @cache
-def surface() -> LipSurface:
-    return LipSurface.of_face(face(), regions())
+def surface() -> ContourSurface:
+    return ContourSurface.of_face(face(), regions())
 
 
 def small_take(n_frames: int = 12, seed: int = 0) -> np.ndarray:

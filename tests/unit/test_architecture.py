@@ -29,7 +29,7 @@ ORDER = [room for floor in FLOORS for room in floor]
 
 MODULE_LINES, FUNCTION_LINES, PARAMETERS = 300, 60, 9
 #: Compiled kernels: one loop over pixels or triangles with all its arrays as arguments.
-KERNELS = {("studio/kernels.py", "shade"), ("geometry/closest_kernels.py", "closest_of")}
+KERNELS = {("studio/kernels.py", "shade_hits"), ("geometry/closest_kernels.py", "closest_of")}
 
 #: Stage -> where its name differs, and why.
 PACKAGE_OF = {
@@ -47,6 +47,18 @@ WITHOUT_SECTION = {
 }
 #: Sections that are no stage: names of files and folders.
 PLAIN_KEYS = {"results", "takes", "chunk_frames", "skip_takes"}
+
+
+#: Names that several modules share, and what they mean in all of them.
+SAME_OF_SEVERAL = {
+    "a program, or a subcommand of one": {"main", "add_arguments", "run"},
+    "a part of a face model that build.py asks for": {
+        "studio_model",
+        "template_model",
+        "tracker_model",
+    },
+    "rows of the quality table, one a frame": {"quality_rows"},
+}
 
 
 def name_of(path):
@@ -77,11 +89,19 @@ def imports():
     found = defaultdict(set)
     for name, tree in modules().items():
         for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vermilion."):
-                base = node.module.removeprefix("vermilion.")
-                for alias in node.names:
-                    whole = f"{base}.{alias.name}"
-                    found[name].add(whole if whole in modules() else base)
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{name}: a relative import"
+                wanted = [(node.module, f"{node.module}.{alias.name}") for alias in node.names]
+            elif isinstance(node, ast.Import):
+                wanted = [(alias.name, alias.name) for alias in node.names]
+            else:
+                continue
+            for base, whole in wanted:
+                if whole.startswith("vermilion."):
+                    base, whole = (
+                        part.removeprefix("vermilion").lstrip(".") for part in (base, whole)
+                    )
+                    found[name].add(whole if whole in modules() else base or "__init__")
     return found
 
 
@@ -98,6 +118,20 @@ def test_no_room_imports_from_a_higher_one():
         if name != "__init__" and ORDER.index(other.split(".")[0]) > ORDER.index(name.split(".")[0])
     ]
     assert wrong == []
+
+
+def test_a_name_means_one_thing():
+    """Public functions and classes of modules: two of a name do the same of two kinds, or are programs."""
+    homes = defaultdict(list)
+    for module, tree in modules().items():
+        for node in tree.body:
+            kinds = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+            if isinstance(node, kinds) and not node.name.startswith("_"):
+                homes[node.name].append(module)
+    assert len(homes) > 1500
+    same = {name for names in SAME_OF_SEVERAL.values() for name in names}
+    assert {n: h for n, h in homes.items() if len(h) > 1 and n not in same} == {}
+    assert sorted(n for n in same if len(homes[n]) < 2) == [], "these have one home: take them out"
 
 
 def test_the_library_does_not_see_the_configuration():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from vermilion.provenance import begun_run
-from vermilion.provenance.begun_run import BegunRun, digest_of, of_this_job, record
+from vermilion.provenance.begun_run import BegunRun, digest_of, of_this_job, record_beginning
 from vermilion.provenance.fingerprint import _read, fingerprint
 
 
@@ -34,7 +34,7 @@ def begun(tmp_path, script, monkeypatch):
         code={"stage/rule": fingerprint(script)},
         stamp=begun_run.stamp_of(script.parents[1]),
     )
-    record(tmp_path / "runs", beginning)
+    record_beginning(tmp_path / "runs", beginning)
     return beginning
 
 
@@ -71,11 +71,11 @@ def test_a_touched_script_runs_and_an_edited_one_does_not(begun, script):
 def test_the_same_beginning_is_written_once_and_old_ones_go(begun, tmp_path):
     folder = tmp_path / "runs"
     before = sorted(folder.iterdir())
-    record(folder, begun)
+    record_beginning(folder, begun)
     assert sorted(folder.iterdir()) == before
     for path in before:
         os.utime(path, (1, 1))
-    record(folder, replace(begun, rules="other"))
+    record_beginning(folder, replace(begun, rules="other"))
     kept = [path for path in folder.iterdir() if path.suffix == ".json"]
     assert [json.loads(path.read_text())["rules"] for path in kept] == ["other"]
 

@@ -10,9 +10,9 @@ from vermilion.provenance.checksums import (
     find_damage,
     foreign_files,
     main,
-    record,
     remove_damaged,
     removed_outputs,
+    update_ledger,
 )
 from vermilion.storage.errors import InputError
 
@@ -44,12 +44,12 @@ def outputs(results):
 
 
 def test_untouched_results_are_whole(results):
-    assert record(results, outputs(results), ended) == []
+    assert update_ledger(results, outputs(results), ended) == []
     assert find_damage(results) == []
 
 
 def test_truncated_file_is_named_and_removed(results):
-    record(results, outputs(results), ended)
+    update_ledger(results, outputs(results), ended)
     os.truncate(results / "a.npy", 10)
     damage = find_damage(results)
     assert [d.path.name for d in damage] == ["a.npy"]
@@ -59,7 +59,7 @@ def test_truncated_file_is_named_and_removed(results):
 
 
 def test_same_size_and_time_but_other_content_is_found(results):
-    record(results, outputs(results), ended)
+    update_ledger(results, outputs(results), ended)
     state = (results / "a.npy").stat()
     (results / "a.npy").write_bytes(b"b" * 1000)
     os.utime(results / "a.npy", ns=(state.st_atime_ns, state.st_mtime_ns))
@@ -67,7 +67,7 @@ def test_same_size_and_time_but_other_content_is_found(results):
 
 
 def test_folder_that_lost_a_file_goes_as_a_whole(results):
-    record(results, outputs(results), ended)
+    update_ledger(results, outputs(results), ended)
     (results / "folder" / "1.png").unlink()
     damage = find_damage(results)
     assert [d.reason for d in damage] == ["missing"]
@@ -77,11 +77,11 @@ def test_folder_that_lost_a_file_goes_as_a_whole(results):
 
 def test_change_after_the_job_is_not_recorded_as_good(results):
     ends = {path: ended(path) for path in outputs(results)}
-    record(results, outputs(results), ends.get)
+    update_ledger(results, outputs(results), ends.get)
     os.truncate(results / "a.npy", 10)
     late = ends[results / "a.npy"] + 100
     os.utime(results / "a.npy", (late, late))
-    refused = record(results, outputs(results), ends.get)
+    refused = update_ledger(results, outputs(results), ends.get)
     assert [d.path.name for d in refused] == ["a.npy"]
     assert "make verify" in refused[0].reason
     assert [d.path.name for d in find_damage(results)] == ["a.npy"]
@@ -89,7 +89,7 @@ def test_change_after_the_job_is_not_recorded_as_good(results):
 
 def test_output_of_a_job_that_was_cut_off_is_not_recorded_and_called_so(results):
     ends = {results / "folder": ended(results / "folder")}
-    refused = record(results, outputs(results), ends.get)
+    refused = update_ledger(results, outputs(results), ends.get)
     assert [d.path.name for d in refused] == ["a.npy"]
     assert "cut off" in refused[0].reason and "verify" not in refused[0].reason
     os.truncate(results / "a.npy", 10)
@@ -97,15 +97,15 @@ def test_output_of_a_job_that_was_cut_off_is_not_recorded_and_called_so(results)
 
 
 def test_rerun_output_is_recorded_anew(results):
-    record(results, outputs(results), ended)
+    update_ledger(results, outputs(results), ended)
     (results / "a.npy").write_bytes(b"c" * 500)
-    assert record(results, outputs(results), ended) == []
+    assert update_ledger(results, outputs(results), ended) == []
     assert find_damage(results) == []
 
 
 def test_outputs_of_a_job_go_together(results):
     first = results / "a.npy"
-    record(results, {first: first, results / "folder": first}, ended)
+    update_ledger(results, {first: first, results / "folder": first}, ended)
     (results / "folder" / "1.png").write_bytes(b"uno")
     damage = find_damage(results)
     assert [d.path.name for d in damage] == ["1.png"]
@@ -119,7 +119,7 @@ def recorded(results):
     (results / "b.npy").write_bytes(b"b" * 1000)
     outputs = {path: path for path in map(results.__truediv__, ("a.npy", "b.npy", "folder"))}
     ends = {path: ended(path) for path in outputs}
-    assert record(results, outputs, ends.get) == []
+    assert update_ledger(results, outputs, ends.get) == []
     return results, outputs, ends
 
 
@@ -184,7 +184,7 @@ def test_every_fault_is_found_also_after_another_run(recorded, fault, another_ru
     results, outputs, ends = recorded
     spoilt = fault(results)
     if another_run:  # one in which no job of these runs
-        record(results, outputs, ends.get)
+        update_ledger(results, outputs, ends.get)
     damage = find_damage(results)
     assert {item.path.name for item in damage} == spoilt
     remove_damaged(results, damage)
@@ -193,7 +193,7 @@ def test_every_fault_is_found_also_after_another_run(recorded, fault, another_ru
 
 def test_a_run_of_part_of_the_results_forgets_none_of_the_others(recorded):
     results, outputs, ends = recorded
-    record(results, {path: path for path in outputs if path.name == "a.npy"}, ends.get)
+    update_ledger(results, {path: path for path in outputs if path.name == "a.npy"}, ends.get)
     truncate(results)
     assert [item.path.name for item in find_damage(results)] == ["2.png"]
 
@@ -201,14 +201,14 @@ def test_a_run_of_part_of_the_results_forgets_none_of_the_others(recorded):
 def test_file_that_an_older_one_replaced_before_it_was_recorded_is_refused(results):
     ends = {path: ended(path) for path in outputs(results)}
     dated(results / "a.npy", -500)
-    refused = record(results, outputs(results), ends.get)
+    refused = update_ledger(results, outputs(results), ends.get)
     assert [item.path.name for item in refused] == ["a.npy"] and "older" in refused[0].reason
 
 
 def test_same_content_with_another_time_is_whole(recorded):
     results, outputs, ends = recorded
     dated(results / "a.npy", 5000)
-    assert record(results, outputs, ends.get) == [] and find_damage(results) == []
+    assert update_ledger(results, outputs, ends.get) == [] and find_damage(results) == []
 
 
 def test_folder_that_a_job_wrote_again_with_fewer_files_is_whole(recorded):
@@ -216,14 +216,14 @@ def test_folder_that_a_job_wrote_again_with_fewer_files_is_whole(recorded):
     (results / "folder" / "1.png").unlink()
     dated(results / "folder" / "2.png", 10)
     ends[results / "folder"] += 10
-    assert record(results, outputs, ends.get) == [] and find_damage(results) == []
+    assert update_ledger(results, outputs, ends.get) == [] and find_damage(results) == []
 
 
 def test_a_file_that_no_job_wrote_is_named_and_left(recorded, capsys):
     results, outputs, ends = recorded
     (results / "folder" / "3.png").write_bytes(b"three")
     dated(results / "folder" / "3.png", -500)
-    assert [item.path.name for item in record(results, outputs, ends.get)] == ["3.png"]
+    assert [item.path.name for item in update_ledger(results, outputs, ends.get)] == ["3.png"]
     assert foreign_files(results) == [results / "folder" / "3.png"]
     assert main([str(results)]) == 1
     printed = capsys.readouterr().out
@@ -242,6 +242,6 @@ def test_a_result_that_is_gone_as_a_whole_is_said(recorded, capsys):
 def test_a_ledger_that_is_cut_off_is_refused(recorded):
     results, outputs, ends = recorded
     os.truncate(results / LEDGER, (results / LEDGER).stat().st_size - 40)
-    for use in (lambda: find_damage(results), lambda: record(results, outputs, ends.get)):
+    for use in (lambda: find_damage(results), lambda: update_ledger(results, outputs, ends.get)):
         with pytest.raises(InputError, match=r"checksums.tsv.*cut off or damaged.*Remove the file"):
             use()

@@ -61,8 +61,8 @@ def test_paths_below_the_project_are_relative_to_it(tmp_path):
 
 
 def test_doctor_says_what_to_do(tmp_path, monkeypatch):
-    assert doctor.python((3, 10, 1)).state == "missing"
-    assert "3.11" in doctor.python((3, 10, 1)).remedy
+    assert doctor.interpreter((3, 10, 1)).state == "missing"
+    assert "3.11" in doctor.interpreter((3, 10, 1)).remedy
     found = doctor.landmark_environment(tmp_path / ".venv-mediapipe")
     assert found.state == "optional" and "setup_landmarks.sh" in str(found)
     monkeypatch.setenv("PATH", str(tmp_path))

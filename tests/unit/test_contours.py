@@ -14,15 +14,15 @@ from vermilion.contours.channels import LEVELS, PAD, image_channels, integral_im
 from vermilion.contours.curves import loop_spline
 from vermilion.contours.detector_file import load_detector
 from vermilion.contours.labelled_frames import LabelledFrame
-from vermilion.contours.labels import contact_lines, dark_valley, read_label
+from vermilion.contours.labels import contact_lines, dark_valley, read_contour_label
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.paths import cheapest_ring
 from vermilion.contours.pool import random_pool
 from vermilion.contours.region import mouth_region
-from vermilion.contours.training import TrainingSettings, train_detector
+from vermilion.contours.training import ContourTrainingSettings, train_detector
 from vermilion.storage.errors import InputError, ModelFileError
 
-SMALL = TrainingSettings(
+SMALL = ContourTrainingSettings(
     n_features=300,
     variants=1,
     max_samples=5000,
@@ -91,7 +91,7 @@ def test_saved_detector_answers_the_same(detector, tmp_path):
 
 def test_training_is_repeatable(detector, tmp_path):
     frames = [LabelledFrame(*draw_mouth(6.0, 24.0, seed=1), 1)]
-    small = TrainingSettings(
+    small = ContourTrainingSettings(
         n_features=100, variants=2, max_samples=2000, boosting=BoostingSettings(n_trees=8)
     )
     for name in ("a", "b"):
@@ -238,7 +238,7 @@ def test_an_unusable_label_says_why(tmp_path, content, message):
     path = tmp_path / "000003.json"
     path.write_text(content)
     with pytest.raises(InputError, match=message):
-        read_label(path, camera="cam", frame=3)
+        read_contour_label(path, camera="cam", frame=3)
 
 
 def test_a_label_is_read(tmp_path):
@@ -253,6 +253,6 @@ def test_a_label_is_read(tmp_path):
             }
         )
     )
-    label = read_label(path)
+    label = read_contour_label(path)
     assert not label.inner.closed
     assert label.outer.dense(1.0)[-1] == pytest.approx([0, 0])

@@ -14,7 +14,7 @@ from vermilion.correspondence.correspondence import (
     CorrespondenceSettings,
     MarkedMesh,
     find_correspondence,
-    register_neutral,
+    register_coarse_neutral,
 )
 from vermilion.correspondence.landmarks import back_project
 from vermilion.geometry.camera import look_at, pinhole
@@ -91,7 +91,7 @@ def surfaces():
 
 def test_registration_finds_the_bent_surface(surfaces):
     coarse, fine, truth = surfaces
-    registered = register_neutral(coarse, fine, SETTINGS)
+    registered = register_coarse_neutral(coarse, fine, SETTINGS)
     inner = np.linalg.norm(coarse.mesh.vertices_mm[:, :2], axis=1) < 70
     error = np.linalg.norm(registered.vertices_mm - truth, axis=1)[inner]
     assert np.sqrt((error**2).mean()) < 0.5  # mm
@@ -129,4 +129,4 @@ def test_too_few_landmarks_are_refused(surfaces):
     coarse, fine, _ = surfaces
     none = replace(coarse, landmarks=coarse.landmarks.restricted(np.zeros(len(fine.landmarks))))
     with pytest.raises(ValueError, match="at least 6 landmark pairs, got 0"):
-        register_neutral(none, fine, SETTINGS)
+        register_coarse_neutral(none, fine, SETTINGS)

@@ -5,7 +5,12 @@ import pytest
 from sklearn.model_selection import GroupKFold
 
 from tests.unit.regression_data import smooth_data
-from vermilion.regression.cross_validation import clips_of, cross_validate, folds_of, target_gram
+from vermilion.regression.cross_validation import (
+    clips_of_rows,
+    cross_validate,
+    folds_of,
+    target_gram,
+)
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork, temporal_prototypes
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import unseen_subject_bias
@@ -31,10 +36,10 @@ def test_short_takes_get_more_prototypes():
 
 def test_clips_are_contiguous_and_never_cross_sequences():
     sequences = np.repeat([0, 1], [70, 31])
-    clips = clips_of(sequences, 30, 3)
+    clips = clips_of_rows(sequences, 30, 3)
     assert np.all(np.diff(clips) >= 0)
     assert not set(clips[:70]) & set(clips[70:])
-    assert len(np.unique(clips_of(np.zeros(9), 30, 5))) >= 5
+    assert len(np.unique(clips_of_rows(np.zeros(9), 30, 5))) >= 5
 
 
 @pytest.mark.parametrize("n_folds", [2, 5, 40])
@@ -50,7 +55,7 @@ def test_folds_are_those_of_group_k_fold(n_folds):
 def test_cross_validation_equals_fitting_and_predicting(data):
     features, targets = data
     sequences, weights = np.repeat([0, 1], 60), np.linspace(0.5, 2.0, 30)
-    clips = clips_of(sequences, 15, 5)
+    clips = clips_of_rows(sequences, 15, 5)
     alphas, betas = [1e-4, 1e-2, 10.0], [0.1, 3.0]
     groups = ["a"] * 3 + ["b"] * 4
     given = (features, target_gram(targets, weights), sequences, clips)
@@ -79,7 +84,7 @@ def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(dat
     features, targets = data
     persons = np.repeat([0, 1, 2], [50, 60, 10])
     targets = targets + 5.0 * persons[:, None]
-    clips = clips_of(persons, 10, 4)
+    clips = clips_of_rows(persons, 10, 4)
     curve = cross_validate(
         AffineRegressor(), features, target_gram(targets), persons, clips,
         alphas=[0.1], n_folds=4, persons=persons,
@@ -153,7 +158,7 @@ def test_an_unseen_subject_gets_no_identity_of_the_only_person_known():
 
 def test_choice_takes_the_smoothest_within_one_standard_error(data):
     features, targets = data
-    clips = clips_of(np.zeros(120), 15, 5)
+    clips = clips_of_rows(np.zeros(120), 15, 5)
     curve = cross_validate(
         AffineRegressor(), features, target_gram(targets), np.zeros(120), clips,
         alphas=[1e-3, 1e-2, 1e-1, 1.0, 1e3],

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.drawn_sketch import Hand, drawn_sketch, smooth_error
 from tests.unit import guided_mouths as mouths
-from vermilion.guided.refinement import RefinementSettings, View
+from vermilion.guided.refinement import RefinementSettings, SketchView
 from vermilion.guided.sketch import CURVE_NAMES
 from vermilion.studio.surface import surface_of
 
@@ -19,7 +19,7 @@ def strokes():
     def draw(error_px, **options):
         hand = Hand(error_px=error_px, **options)
         sketch = drawn_sketch(face, surface, mesh, camera, 3, hand)
-        view = View.of(sketch, camera, RefinementSettings())
+        view = SketchView.of(sketch, camera, RefinementSettings())
         contours = view.contours(mesh, mouths.surface())
         return sketch, {n: contours[n].nearest(view.samples[n])[1] for n in contours}
 

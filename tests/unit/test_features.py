@@ -7,7 +7,7 @@ import pytest
 
 from tests.unit.mouths import crest, draw_mouth, ellipse, facing_camera, mouth_model
 from vermilion.contours.curves import inward_normals
-from vermilion.features.contour_features import ContourSampler, interocular_px
+from vermilion.features.contour_features import ContourSampler, facing_interocular_px
 from vermilion.features.distances import NAMES, contour_distances
 from vermilion.features.rings import lip_rings
 from vermilion.features.search import SearchSettings, find_inner
@@ -194,8 +194,8 @@ def test_unit_does_not_shrink_when_the_head_turns():
     corners = np.array([[-100.0, 80.0, 0.0], [100.0, 80.0, 0.0]])
     yaw = np.radians(35)
     turn = np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
-    assert interocular_px(corners, camera) == pytest.approx(200.0)
-    assert interocular_px(corners @ turn.T, camera) == pytest.approx(200.0, rel=1e-6)
+    assert facing_interocular_px(corners, camera) == pytest.approx(200.0)
+    assert facing_interocular_px(corners @ turn.T, camera) == pytest.approx(200.0, rel=1e-6)
 
 
 def test_shape_space_keeps_the_asked_variance_and_reproduces_what_it_spans():

@@ -6,11 +6,11 @@ import pytest
 from tests.unit.synthetic_face import landmark_layout
 from vermilion.config.takes import read_takes
 from vermilion.imaging.images import srgb_to_linear
-from vermilion.landmarks.cuts import FrameLooks, find_cuts, look_of, pieces_of
+from vermilion.landmarks.cuts import FrameLooks, find_cuts, frame_look, pieces_of
 from vermilion.landmarks.detect import followed_track
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.faces import FaceFinds, SeenFaces, find_faces, sharp_eyes_px
-from vermilion.landmarks.following import FaceChoice, FollowedFace, follow
+from vermilion.landmarks.following import FaceChoice, FollowedFace, follow_face
 from vermilion.landmarks.sets import IBUG66
 
 LAYOUT = landmark_layout()
@@ -57,7 +57,7 @@ def test_the_largest_face_is_kept_where_it_is_lost_and_where_another_grows(tmp_p
         shown = [mine, other] if frame % 2 else [other, mine]
         faces.append([other] if 20 <= frame < 23 else shown)
     path = finds_of(tmp_path, faces, [scene(0)] * 40)
-    followed = follow(SeenFaces.load([path]), choice())
+    followed = follow_face(SeenFaces.load([path]), choice())
     followed.save(tmp_path / "followed.npz")
     track, rows = followed_track(FaceFinds.load(path), FollowedFace.load(tmp_path / "followed.npz"))
     assert list(np.flatnonzero(~track.valid)) == [20, 21, 22]
@@ -74,14 +74,14 @@ def test_the_largest_face_is_kept_where_it_is_lost_and_where_another_grows(tmp_p
 def test_a_point_or_a_box_says_which_face(tmp_path, values, x):
     faces = [[face((300, 200), 160), face((700, 200), 100)] for _ in range(10)]
     seen = seen_of(tmp_path, faces)
-    followed = follow(seen, choice(values))
+    followed = follow_face(seen, choice(values))
     assert followed.valid.all()
     assert {round(float(faces[0][k].points_px[:, 0].mean())) for k in followed.face} == {x}
 
 
 def test_no_face_in_the_box_is_no_face(tmp_path):
     seen = seen_of(tmp_path, [[face((300, 200), 160)] for _ in range(5)])
-    followed = follow(seen, choice((0, 0, 100, 100)))
+    followed = follow_face(seen, choice((0, 0, 100, 100)))
     assert not followed.valid.any()
     assert "1 other face(s) are not taken for it" in followed.reason[0]
 
@@ -89,17 +89,17 @@ def test_no_face_in_the_box_is_no_face(tmp_path):
 def test_a_cut_divides_and_its_first_frame_says_so(tmp_path):
     faces = [[face((300, 200), 160)]] * 12 + [[face((620, 240), 120)]] * 12
     images = [scene(1)] * 12 + [scene(2)] * 12
-    followed = follow(seen_of(tmp_path, faces, images), choice())
+    followed = follow_face(seen_of(tmp_path, faces, images), choice())
     assert followed.valid.all()
     assert list(followed.piece) == [0] * 12 + [1] * 12
     assert followed.reason[12] == "a cut: piece 2 begins"
     assert set(np.delete(followed.reason, 12)) == {""}
-    whole = follow(seen_of(tmp_path, faces, images), choice(), one_shot=True)
+    whole = follow_face(seen_of(tmp_path, faces, images), choice(), one_shot=True)
     assert not whole.piece.any()
 
 
 def cuts_of(images):
-    return list(find_cuts(FrameLooks.of([look_of(image) for image in images])))
+    return list(find_cuts(FrameLooks.of([frame_look(image) for image in images])))
 
 
 def test_pans_flashes_and_brightening_are_no_cuts():
@@ -119,21 +119,21 @@ def test_a_jump_of_the_face_before_the_same_background_is_a_cut(tmp_path):
 
     x = np.where(np.arange(40) < 20, 30, 44) + np.round(np.sin(np.arange(40) / 3)).astype(int)
     faces = [[face((8 * k, 200), 160)] for k in x]
-    followed = follow(seen_of(tmp_path, faces, [image(k) for k in x]), choice())
+    followed = follow_face(seen_of(tmp_path, faces, [image(k) for k in x]), choice())
     assert list(np.flatnonzero(np.diff(followed.piece))) == [19]
     moving = [[face((8 * 30 + 6 * k, 200), 160)] for k in range(40)]
-    still = follow(seen_of(tmp_path, moving, [image(30)] * 40), choice())
+    still = follow_face(seen_of(tmp_path, moving, [image(30)] * 40), choice())
     assert not still.piece.any()
 
 
 def test_an_unreadable_image_is_no_cut():
-    looks = [look_of(scene(1)) for _ in range(9)]
+    looks = [frame_look(scene(1)) for _ in range(9)]
     looks[4] = (np.zeros_like(looks[0][0]), np.zeros_like(looks[0][1]))
     assert list(pieces_of(9, find_cuts(FrameLooks.of(looks)))) == [0] * 9
 
 
 def test_a_small_or_blurred_face_is_flagged_with_its_size(tmp_path):
-    small = follow(seen_of(tmp_path, [[face((80, 45), 14)]] * 3), choice())
+    small = follow_face(seen_of(tmp_path, [[face((80, 45), 14)]] * 3), choice())
     assert not small.valid.any()
     assert small.reason[0].startswith("the face is too small: eyes 9 px apart, at least 16 px")
     sharp = np.kron(np.indices((24, 40)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.ones(3)
@@ -159,10 +159,10 @@ def test_a_face_on_its_side_is_told_with_the_command_that_turns_it(tmp_path, deg
             LAYOUT[:, 2],
         ]
     )
-    found = follow(seen_of(tmp_path, [[face((300, 200), 160, shape=lying)]] * 3), choice())
+    found = follow_face(seen_of(tmp_path, [[face((300, 200), 160, shape=lying)]] * 3), choice())
     assert found.valid.all() and f"turned by {abs(degrees)} degrees" in found.reason[0]
     assert command in found.reason[0] and found.reason[1] == ""
-    upright = follow(seen_of(tmp_path, [[face((300, 200), 160)]] * 3), choice())
+    upright = follow_face(seen_of(tmp_path, [[face((300, 200), 160)]] * 3), choice())
     assert (upright.reason == "").all()
 
 
@@ -175,11 +175,11 @@ def test_another_person_after_a_cut_is_told_and_left_out(tmp_path):
     def noisy(shape):
         return face((300, 200), 160, shape=shape + noise.normal(0, 0.4, shape.shape))
 
-    followed = follow(seen_of(tmp_path, [[noisy(s)] for s in shapes], images), choice())
+    followed = follow_face(seen_of(tmp_path, [[noisy(s)] for s in shapes], images), choice())
     assert list(followed.valid) == [True] * 10 + [False] * 10 + [True] * 10
     assert "another person than in the first piece" in followed.reason[15]
     flat = [[face((300, 200), 160, shape=s, deep=False)] for s in shapes]
-    assert follow(seen_of(tmp_path, flat, images), choice()).valid.all()  # nothing tells
+    assert follow_face(seen_of(tmp_path, flat, images), choice()).valid.all()  # nothing tells
 
 
 def test_the_take_sheet_may_say_which_face(tmp_path):

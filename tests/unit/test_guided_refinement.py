@@ -16,10 +16,10 @@ from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.refinement import (
     RefinementSettings,
     SketchRefiner,
-    View,
+    SketchView,
     ray_constraints,
 )
-from vermilion.guided.silhouette import LipSurface, inner_silhouettes
+from vermilion.guided.silhouette import ContourSurface, inner_silhouettes
 from vermilion.guided.sketch import Sketch, SketchCurve
 from vermilion.storage.errors import InputError
 
@@ -42,7 +42,7 @@ def true() -> np.ndarray:
 def test_the_contour_lands_within_a_pixel_of_the_sketch(refiner, base, true):
     camera = mouths.camera()
     sketch = mouths.drawn(true, camera)
-    start = View.of(sketch, camera, RefinementSettings())
+    start = SketchView.of(sketch, camera, RefinementSettings())
     off = start.contours(base, mouths.surface())
     before = max(
         off[name].nearest(start.samples[name])[1].max() for name in ("upper_inner", "lower_inner")
@@ -185,7 +185,7 @@ def test_the_nearest_point_of_a_segment_lies_between_its_vertices(base):
 
 def test_sides_need_no_face_model(base, true):
     camera = mouths.camera()
-    bare = SketchRefiner(mouths.regions(), LipSurface.of_regions(mouths.regions()))
+    bare = SketchRefiner(mouths.regions(), ContourSurface.of_regions(mouths.regions()))
     result = bare.refine(base, [(mouths.drawn(true, camera), camera)])
     assert result.mean_px < 0.5
 
@@ -238,7 +238,7 @@ def test_what_cannot_be_refined_is_named(refiner, base, true):
         refiner.refine(base, [(replace(sketch, image_size_px=(320, 320)), camera)])
     with pytest.raises(InputError, match="not finite round the mouth"):
         refiner.refine(np.full_like(base, np.nan), [(sketch, camera)])
-    bare = SketchRefiner(mouths.regions(), LipSurface.of_regions(mouths.regions()))
+    bare = SketchRefiner(mouths.regions(), ContourSurface.of_regions(mouths.regions()))
     outer = {"upper_outer": SketchCurve(np.array([[300.0, 300.0], [340.0, 300.0]]))}
     with pytest.raises(InputError, match="outer contours only with a face model"):
         bare.refine(base, [(Sketch("front", 0, mouths.IMAGE_PX, outer), camera)])

@@ -6,14 +6,19 @@ import pytest
 
 from tests.unit.test_landmark_descent import drawn_face
 from vermilion.imaging.images import linear_to_srgb
-from vermilion.landmarks.correct_key_frames import settle
-from vermilion.landmarks.correction import FILLED, CorrectionSettings, correct, flow_points
+from vermilion.landmarks.correct_key_frames import correct_key_frames
+from vermilion.landmarks.correction import (
+    FILLED,
+    LandmarkCorrectionSettings,
+    correct_landmarks,
+    flow_points,
+)
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.key_frames import BETWEEN, GIVEN, NEUTRAL, KeyFrames, find_key_frames
 from vermilion.storage.errors import InputError
 
 N_FRAMES, STEP_PX = 7, np.array([1.5, -0.75])
-SETTINGS = CorrectionSettings(face_px=120.0)
+SETTINGS = LandmarkCorrectionSettings(face_px=120.0)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +84,7 @@ def test_correction_is_nearer_to_the_truth_and_keeps_the_key_frames(clip):
     greys, truth = clip
     track = detected(truth)
     keys = key_frames(track.points_px, [0, N_FRAMES - 1], [NEUTRAL, BETWEEN])
-    found, rows = correct(reader(greys), track, keys, track.frames, SETTINGS)
+    found, rows = correct_landmarks(reader(greys), track, keys, track.frames, SETTINGS)
     assert np.allclose(found.points_px[[0, -1]], truth[[0, -1]])
     raw_px = np.linalg.norm(track.points_px - truth, axis=-1)[1:-1]
     left_px = np.linalg.norm(found.points_px - truth, axis=-1)[1:-1]
@@ -90,7 +95,7 @@ def test_correction_is_nearer_to_the_truth_and_keeps_the_key_frames(clip):
 
 
 def test_weights_are_those_of_the_paper_but_on_the_inner_lips():
-    weights = CorrectionSettings().per_landmark()
+    weights = LandmarkCorrectionSettings().per_landmark()
     inner = [59, 60, 61, 63, 64, 65]
     outer = np.setdiff1d(np.arange(48, 66), inner)  # with both mouth corners
     assert (weights[outer] == 0.1).all() and (weights[inner] == 0.5).all()
@@ -101,9 +106,9 @@ def test_frames_do_not_depend_on_the_chunk(clip):
     greys, truth = clip
     track = detected(truth)
     keys = key_frames(track.points_px, [0, 3], [NEUTRAL, BETWEEN])
-    whole, _ = correct(reader(greys), track, keys, np.arange(N_FRAMES), SETTINGS)
+    whole, _ = correct_landmarks(reader(greys), track, keys, np.arange(N_FRAMES), SETTINGS)
     for chunk in ([0, 1], [2], [3, 4, 5, 6]):
-        part, _ = correct(reader(greys), track, keys, np.array(chunk), SETTINGS)
+        part, _ = correct_landmarks(reader(greys), track, keys, np.array(chunk), SETTINGS)
         assert np.array_equal(part.points_px, whole.points_px[chunk])
 
 
@@ -111,7 +116,7 @@ def test_a_frame_without_a_face_is_filled_and_says_so(clip):
     greys, truth = clip
     track = without_face(detected(truth), [3])
     keys = key_frames(track.points_px, [0, N_FRAMES - 1], [NEUTRAL, BETWEEN])
-    found, rows = correct(reader(greys), track, keys, track.frames, SETTINGS)
+    found, rows = correct_landmarks(reader(greys), track, keys, track.frames, SETTINGS)
     assert found.valid.all() and rows[3].reason == FILLED
     assert np.linalg.norm(found.points_px[3] - truth[3], axis=-1).mean() < 0.4
 
@@ -120,7 +125,7 @@ def test_a_damaged_image_stays_without_landmarks_and_flow_goes_past_it(clip):
     greys, truth = clip
     track = without_face(detected(truth), [3])
     keys = key_frames(track.points_px, [0], [NEUTRAL])
-    found, rows = correct(reader(greys, [3]), track, keys, track.frames, SETTINGS)
+    found, rows = correct_landmarks(reader(greys, [3]), track, keys, track.frames, SETTINGS)
     assert list(found.valid) == [True] * 3 + [False] + [True] * 3
     assert np.isnan(found.points_px[3]).all() and not rows[3].valid and rows[3].reason
     assert np.linalg.norm(found.points_px[5] - truth[5], axis=-1)[48:].mean() < 1
@@ -131,7 +136,7 @@ def test_given_points_count_and_the_detector_loses_its_offset(clip):
     track = detected(truth + 6.0, noise_px=0.0)
     keys = find_key_frames(reader(greys), track, {0: truth[0]})
     assert list(keys.kinds) == [GIVEN]
-    found, _ = correct(reader(greys), track, keys, track.frames, SETTINGS)
+    found, _ = correct_landmarks(reader(greys), track, keys, track.frames, SETTINGS)
     assert np.array_equal(found.points_px[0], truth[0])
     assert np.linalg.norm(found.points_px - truth, axis=-1).mean() < 0.3
 
@@ -152,13 +157,13 @@ def test_a_wrong_key_frame_inside_a_clip_ends_near_the_truth(clip, last):
     track = detected(truth, noise_px=0.0)
     track.points_px[3] += 10.0  # where the patches misled; with `last` between, one way only
     keys = key_frames(track.points_px, [0, 3, N_FRAMES - 1], [NEUTRAL, BETWEEN, last])
-    settled = settle(reader(greys), track, keys, SETTINGS)
+    settled = correct_key_frames(reader(greys), track, keys, SETTINGS)
     error_px = np.linalg.norm(settled.points_px[1] - truth[3], axis=-1)
     wrong_px = np.hypot(10, 10)
     assert error_px[48:59].mean() < 0.15 * wrong_px  # lambda 0.1
     assert np.array_equal(settled.points_px[0], keys.points_px[0])
-    before, _ = correct(reader(greys), track, keys, [2, 4], SETTINGS)
-    after, _ = correct(reader(greys), track, settled, [2, 4], SETTINGS)
+    before, _ = correct_landmarks(reader(greys), track, keys, [2, 4], SETTINGS)
+    after, _ = correct_landmarks(reader(greys), track, settled, [2, 4], SETTINGS)
     mouth_px = [
         np.linalg.norm(t.points_px - truth[[2, 4]], axis=-1)[:, 48:59].mean()
         for t in (before, after)
@@ -170,7 +175,7 @@ def test_given_and_neutral_key_frames_are_not_settled(clip):
     greys, truth = clip
     track = detected(truth)
     keys = key_frames(track.points_px, [0, 3, 5], [GIVEN, NEUTRAL, NEUTRAL])
-    assert settle(reader(greys), track, keys, SETTINGS) is keys
+    assert correct_key_frames(reader(greys), track, keys, SETTINGS) is keys
 
 
 def test_where_flow_is_lost_the_detector_settles(clip):
@@ -179,7 +184,9 @@ def test_where_flow_is_lost_the_detector_settles(clip):
     others = [rng.uniform(size=grey.shape).astype(np.float32) for grey in greys]
     track = detected(truth, noise_px=0.0)
     keys = key_frames(track.points_px, [0, 6], [NEUTRAL, BETWEEN])
-    lost = settle(reader(others), track, keys, CorrectionSettings(face_px=120.0, mouth=0.5))
+    lost = correct_key_frames(
+        reader(others), track, keys, LandmarkCorrectionSettings(face_px=120.0, mouth=0.5)
+    )
     moved_px = np.linalg.norm(lost.points_px[1] - truth[6], axis=-1)
     assert np.median(moved_px) < 2.0
 
@@ -188,5 +195,5 @@ def test_a_take_without_a_face_stays_as_it_is(clip):
     greys, truth = clip
     track = without_face(detected(truth), list(range(N_FRAMES)))
     keys = find_key_frames(reader(greys), track, {})
-    found, rows = correct(reader(greys), track, keys, track.frames, SETTINGS)
+    found, rows = correct_landmarks(reader(greys), track, keys, track.frames, SETTINGS)
     assert not found.valid.any() and not any(row.valid for row in rows)

@@ -25,14 +25,14 @@ from vermilion.landmarks.scheme import (
     face_size_px,
 )
 from vermilion.landmarks.training import (
-    TrainingSettings,
+    LandmarkTrainingSettings,
     labelled_images,
     ridge_regression,
     train_descent,
 )
 from vermilion.storage.errors import InputError, ModelFileError
 
-SETTINGS = TrainingSettings(stages=4, perturbations=4, seed=1)
+SETTINGS = LandmarkTrainingSettings(stages=4, perturbations=4, seed=1)
 
 
 def drawn_face(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -9,8 +9,8 @@ from tests.unit.synthetic_face import landmark_layout
 from vermilion.landmarks.detect import followed_track
 from vermilion.landmarks.detector import Landmarks, LandmarkTrack
 from vermilion.landmarks.faces import SeenFaces, find_faces
-from vermilion.landmarks.following import FaceChoice, follow
-from vermilion.landmarks.labels import label_files, read_label, read_labels
+from vermilion.landmarks.following import FaceChoice, follow_face
+from vermilion.landmarks.labels import label_files, read_labels, read_landmark_label
 from vermilion.landmarks.point_file import read_point_file
 from vermilion.landmarks.scheme import FROM_68, LIP_INNER, LIP_OUTER, MIRROR, interocular_px
 from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
@@ -84,7 +84,7 @@ def test_an_unreadable_frame_is_flagged_and_the_rest_goes_on(tmp_path):
     finds = find_faces(read, find, [0, 1, 2, 3])
     finds.save(tmp_path / "000000-000003.npz")
     seen = SeenFaces.load([tmp_path / "000000-000003.npz"])
-    track, rows = followed_track(finds, follow(seen, FaceChoice(least_eyes_px=0.0)))
+    track, rows = followed_track(finds, follow_face(seen, FaceChoice(least_eyes_px=0.0)))
     assert list(track.valid) == [True, False, False, True]
     assert "truncated" in rows[1].reason and rows[2].reason == "no face found"
     assert rows[3].figures["confidence"] == pytest.approx(0.9)
@@ -112,7 +112,7 @@ def test_wrong_labels_name_their_file(tmp_path, points):
     path = tmp_path / "000004.json"
     path.write_text(json.dumps({"points": np.asarray(points).tolist()}))
     with pytest.raises(InputError, match=r"000004\.json"):
-        read_label(path)
+        read_landmark_label(path)
 
 
 def write_csv(path, count=68, frames=(1, 2, 3), confidence=(0.98, 0.9, 0.2), success=(1, 0, 1)):

@@ -8,7 +8,7 @@ from vermilion.landmarks.binary_patterns import (
     N_UNIFORM,
     affine_between,
     chi_squared,
-    histograms,
+    code_histograms,
     lbp4,
     lbp8,
     uniform_code,
@@ -69,7 +69,7 @@ def test_a_quarter_turn_of_the_image_turns_the_codes(image):
 
 def test_histograms_are_shares_of_59_and_16_bins(image):
     boxes = np.array([[0, 0, 6, 5], [6, 5, 10, 10]])
-    found = histograms(uniform_code(lbp8(image)), lbp4(image), boxes)
+    found = code_histograms(uniform_code(lbp8(image)), lbp4(image), boxes)
     assert found.shape == (2, N_BINS) == (2, 75)
     assert np.allclose(found[:, :N_UNIFORM].sum(axis=1), 1)
     assert np.allclose(found[:, N_UNIFORM:].sum(axis=1), 1)

@@ -5,7 +5,14 @@ import pandas as pd
 import pytest
 
 from tests import lip_patch
-from vermilion.multiview.drift import ALL, DriftSettings, Origin, carry, drift_rows, neighbours
+from vermilion.multiview.drift import (
+    ALL,
+    DriftSettings,
+    NeutralImages,
+    carry,
+    drift_rows,
+    neighbouring_cameras,
+)
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.views import Frame, make_view
 from vermilion.report.multiview_page import FrameSheet, TakeFindings, choose_frames, report_page
@@ -30,7 +37,7 @@ def scene():
     """The neutral's images, and those of another frame that misses a camera."""
     model, rest = lip_patch.face_model(), lip_patch.vertices_at(0.0, 0.0)
     truth = lip_patch.vertices_at(*POSE)
-    return Origin.of(frame_of(0, rest), rest, model), frame_of(1, truth, ["left"]), truth
+    return NeutralImages.of(frame_of(0, rest), rest, model), frame_of(1, truth, ["left"]), truth
 
 
 def rows(origin, frame, vertices):
@@ -65,7 +72,7 @@ def test_a_camera_without_a_image_is_named(scene):
 
 def test_neighbouring_cameras_agree_on_the_true_neutral(scene):
     origin, rest = scene[0], lip_patch.vertices_at(0.0, 0.0)
-    sources = neighbours(origin.frame, rest.mean(axis=0))
+    sources = neighbouring_cameras(origin.frame, rest.mean(axis=0))
     assert all(name != source for name, source in sources.items())
     carried = carry(origin, origin.frame, rest, FlowMatcher(), SETTINGS, sources)
     found = pd.DataFrame(drift_rows(origin, origin.frame, carried, 1.0)).set_index("camera")

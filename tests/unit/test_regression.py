@@ -11,7 +11,7 @@ from sklearn.preprocessing import StandardScaler
 
 from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import (
-    clips_of,
+    clips_of_rows,
     held_out_novelty,
 )
 from vermilion.regression.estimators import (
@@ -214,7 +214,7 @@ def test_variance_of_a_prediction_is_that_of_a_gaussian_process(data):
 def test_held_out_clips_are_more_novel_than_frames_trained_on(data, kind):
     features, targets = data
     sequences = np.zeros(120)
-    held = held_out_novelty(kind(), features, sequences, clips_of(sequences, 20, 4), 4)
+    held = held_out_novelty(kind(), features, sequences, clips_of_rows(sequences, 20, 4), 4)
     known = kind().fit(features, targets).novelty(features)
     assert np.median(held) > np.median(known)
     assert kind().fit(features, targets).novelty(features[:1] + 1e3)[0] > held.max()

@@ -17,8 +17,8 @@ from vermilion.scan.fit import standard_unit
 from vermilion.scan.landmarks import (
     ScanLandmarks,
     find_landmarks,
-    read_landmarks,
-    write_landmarks,
+    read_scan_landmarks,
+    write_scan_landmarks,
 )
 from vermilion.scan.personal import personal_model, searching_vertices, transferred
 from vermilion.scan.read import read_scan
@@ -257,14 +257,14 @@ def test_a_scan_of_a_forehead_is_refused(generic):
 def test_landmarks_by_hand_come_back_and_are_checked(tmp_path, generic):
     points = generic.neutral_mm[generic.landmarks].copy()
     points[3] = np.nan
-    write_landmarks(tmp_path / "l.tsv", ScanLandmarks(points, np.zeros(66)))
-    np.testing.assert_allclose(read_landmarks(tmp_path / "l.tsv").points, points, rtol=1e-8)
+    write_scan_landmarks(tmp_path / "l.tsv", ScanLandmarks(points, np.zeros(66)))
+    np.testing.assert_allclose(read_scan_landmarks(tmp_path / "l.tsv").points, points, rtol=1e-8)
     (tmp_path / "few.tsv").write_text("landmark\tx\ty\tz\n1\t0\t0\t0\n2\t0\t0\t0\n")
     with pytest.raises(InputError, match="found 2 landmarks; expected at least 6"):
-        read_landmarks(tmp_path / "few.tsv", "anna")
+        read_scan_landmarks(tmp_path / "few.tsv", "anna")
     (tmp_path / "wrong.tsv").write_text("landmark\tx\ty\tz\n70\t0\t0\t0\n")
     with pytest.raises(InputError, match=r"found landmarks \[70\]"):
-        read_landmarks(tmp_path / "wrong.tsv", "anna")
+        read_scan_landmarks(tmp_path / "wrong.tsv", "anna")
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 
 from tests.unit.mouths import draw_mouth, ellipse
 from vermilion.contours.curves import (
-    filled,
+    inside_of,
     loop_spline,
     outward_normals,
     smoothed_halves,
@@ -103,7 +103,7 @@ def test_what_is_nearly_black_between_lips_is_a_hole_and_no_contact(detector, da
     """`dark` is the line's lightness against the lips'; all of it lies within the reach of contacts."""
     rows = np.abs(np.arange(240) + 0.5 - CENTRE[1])
     lightness = np.repeat(np.where(rows < 3, 0.4 * dark, 0.4)[:, None], 240, axis=1)
-    lip = filled(ellipse(CENTRE, WIDTH, 26.0, 80), 240)
+    lip = inside_of(ellipse(CENTRE, WIDTH, 26.0, 80), 240)
     planes = [plane.astype(np.float32) for plane in (lightness, lightness, lip, lip)]
     curve = ellipse(CENTRE, 0.75 * WIDTH, 0.01, 80)
     points = curve[:, None] + np.array([0.0, 1.0]) * np.arange(-9, 10)[:, None]

@@ -37,7 +37,7 @@ def record_beginning():
         code=code,
         stamp=STAMP,
     )
-    begun_run.record(Path(".snakemake/vermilion"), begun)
+    begun_run.record_beginning(Path(".snakemake/vermilion"), begun)
 
 
 def link_to_local_copies(results):

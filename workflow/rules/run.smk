@@ -98,7 +98,7 @@ def record_checksums():
                 jobs[path] = Path(job.output[0])
                 ends[path] = getattr(workflow.persistence.metadata(output), "endtime", None)
     try:
-        refused = checksums.record(Path(R), jobs, ends.get)
+        refused = checksums.update_ledger(Path(R), jobs, ends.get)
     except VermilionError as error:
         print(error, file=sys.stderr)
         return

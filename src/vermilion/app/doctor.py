@@ -53,7 +53,7 @@ class Finding:
 def findings(project: Path) -> list[Finding]:
     """All findings, in the order in which a newcomer needs them."""
     return [
-        python(),
+        interpreter(),
         packages(),
         landmark_environment(project / ENVIRONMENT),
         face_files(),
@@ -64,7 +64,7 @@ def findings(project: Path) -> list[Finding]:
     ]
 
 
-def python(version: tuple[int, ...] = sys.version_info[:3]) -> Finding:
+def interpreter(version: tuple[int, ...] = sys.version_info[:3]) -> Finding:
     """The interpreter that runs this."""
     found = ".".join(str(part) for part in version)
     if version[:2] >= LEAST_PYTHON:

@@ -96,10 +96,10 @@ def inside_and_distance(curve: np.ndarray, size: int) -> tuple[np.ndarray, np.nd
     away = np.ones((size, size), dtype=np.uint8)
     cv2.polylines(away, [np.rint(curve - 0.5).astype(np.int32)], True, 0)
     distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return filled(curve, size), distance
+    return inside_of(curve, size), distance
 
 
-def filled(curve: np.ndarray, size: int) -> np.ndarray:
+def inside_of(curve: np.ndarray, size: int) -> np.ndarray:
     """Inside of a closed `curve` (n, 2), (size, size) bool."""
     inside = np.zeros((size, size), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(curve - 0.5).astype(np.int32)], 1)

@@ -10,7 +10,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from vermilion.contours.curves import outward_normals
-from vermilion.contours.labels import ContourLabel, check_label, label_paths, read_label
+from vermilion.contours.labels import (
+    ContourLabel,
+    check_contour_label,
+    label_paths,
+    read_contour_label,
+)
 from vermilion.contours.ridges import blurred_colours
 from vermilion.contours.track_ridge import TrackRidgeDetector
 from vermilion.imaging.frames import FrameSource
@@ -63,13 +68,13 @@ def read_labelled(
         if not landmarks.valid[index[0]]:
             left_out.append(QualityRow(frame, reason="label left out: no landmarks"))
             continue
-        drawn = read_label(path, camera=camera, frame=frame, **place)
+        drawn = read_contour_label(path, camera=camera, frame=frame, **place)
         try:
             image = source.read(camera, frame)
         except InputError as error:
             left_out.append(QualityRow(frame, reason=f"label left out: unreadable: {error}"))
             continue
-        check_label(drawn, image.shape[1::-1], path, camera=camera, frame=frame, **place)
+        check_contour_label(drawn, image.shape[1::-1], path, camera=camera, frame=frame, **place)
         points = landmarks.points_px[index[0]]
         labelled.append(LabelledFrame(image, points, drawn, frame))
     if required and not labelled:

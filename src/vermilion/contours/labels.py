@@ -43,7 +43,7 @@ class ContourLabel:
     outer: Polyline
 
 
-def read_label(path: str | Path, **place) -> ContourLabel:
+def read_contour_label(path: str | Path, **place) -> ContourLabel:
     """Read one `labels/contours/<camera>/<frame>.json`; raises InputError where it is not so."""
     try:
         data = load_label(Path(path))
@@ -59,7 +59,7 @@ def read_label(path: str | Path, **place) -> ContourLabel:
     return ContourLabel(**lines)
 
 
-def check_label(
+def check_contour_label(
     label: ContourLabel, size_px: tuple[int, int], path: str | Path, **place: Any
 ) -> None:
     """Raise InputError where contours do not lie in their image of `size_px` (width, height)."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vermilion.contours.curves import filled, loop_spline
+from vermilion.contours.curves import inside_of, loop_spline
 from vermilion.contours.lip_planes import lip_planes
 from vermilion.contours.region import MouthRegion
 from vermilion.contours.ridges import SEARCHES, RidgeDetector, blurred_colours, cues_of
@@ -34,7 +34,7 @@ class LandmarkRidgeDetector(RidgeDetector):
             curves["outer"], strengths["outer"] = self.fit_border(
                 curves["outer"], planes["outer"], search.outer_reach * reach, search.step_px
             )
-            lip = filled(curves["outer"], region.size_px).astype(np.float32)
+            lip = inside_of(curves["outer"], region.size_px).astype(np.float32)
             cues = cues_of(colours, planes["flesh"], lip)
             if search is SEARCHES[0]:
                 landmarks["inner"] = self.to_holes(landmarks["inner"], cues, search.step_px)

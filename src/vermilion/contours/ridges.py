@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from vermilion.contours.channels import image_channels
 from vermilion.contours.curves import (
     distance_across,
-    filled,
+    inside_of,
     outward_normals,
     sampled,
     smoothed_ring,
@@ -270,7 +270,7 @@ def inner_cues(
     The borders are thought to be `outer` and `inner` (n, 2) px.
     """
     planes = lip_planes(colours, {"outer": outer, "inner": inner}, search.band, search.tolerance)
-    lip = filled(outer, colours.shape[1]).astype(np.float32)
+    lip = inside_of(outer, colours.shape[1]).astype(np.float32)
     return cues_of(colours, planes["flesh"], lip), planes["inner"]
 
 

@@ -26,7 +26,7 @@ from vermilion.storage.progress import progress
 
 
 @dataclass(frozen=True)
-class TrainingSettings:
+class ContourTrainingSettings:
     """How samples are drawn and detectors trained. Lengths are in region pixels.
 
     Attributes:
@@ -56,7 +56,7 @@ class TrainingSettings:
     boosting: BoostingSettings = field(default_factory=BoostingSettings)
 
     @classmethod
-    def of(cls, section) -> TrainingSettings:
+    def of(cls, section) -> ContourTrainingSettings:
         """From a section of the configuration with the same names."""
         given: dict[str, Any] = {f.name: getattr(section, f.name, None) for f in fields(cls)}
         trees = section.boosting.model_dump()
@@ -74,7 +74,7 @@ class _Example:
 
 
 def train_detector(
-    frames: Sequence[LabelledFrame], settings: TrainingSettings, seed: int = 0
+    frames: Sequence[LabelledFrame], settings: ContourTrainingSettings, seed: int = 0
 ) -> BoostedDetector:
     """Train the inner and the outer detector, separately, on labelled frames of one illumination.
 
@@ -105,7 +105,7 @@ def train_detector(
 
 
 def _examples(
-    frame: LabelledFrame, settings: TrainingSettings, random: np.random.Generator
+    frame: LabelledFrame, settings: ContourTrainingSettings, random: np.random.Generator
 ) -> list[_Example]:
     examples = []
     for variant in range(settings.variants):
@@ -134,7 +134,7 @@ def _add_contact(
     usable: np.ndarray,
     lightness: np.ndarray,
     segments: Sequence[np.ndarray],
-    settings: TrainingSettings,
+    settings: ContourTrainingSettings,
 ) -> None:
     """Let the lips' line of contact count as inner contour, in place.
 
@@ -166,7 +166,7 @@ def _train_one(
     examples: Sequence[_Example],
     name: str,
     pool: FeaturePool,
-    settings: TrainingSettings,
+    settings: ContourTrainingSettings,
     random: np.random.Generator,
 ) -> Forest:
     chosen = [_first_samples(example, name, settings, random) for example in examples]
@@ -191,7 +191,7 @@ def _train_one(
 
 
 def _first_samples(
-    example: _Example, name: str, settings: TrainingSettings, random: np.random.Generator
+    example: _Example, name: str, settings: ContourTrainingSettings, random: np.random.Generator
 ) -> np.ndarray:
     """Every pixel near the contour, half of those a little farther, a few of the rest."""
     distance = example.distance[name]
@@ -203,7 +203,7 @@ def _first_samples(
 
 
 def _hard_samples(
-    example: _Example, name: str, forest: Forest, settings: TrainingSettings
+    example: _Example, name: str, forest: Forest, settings: ContourTrainingSettings
 ) -> np.ndarray:
     """Pixels farther than three deviations from the contour that look like contour."""
     rows, columns = np.nonzero(example.usable[name])
@@ -231,7 +231,7 @@ def _collect(
     name: str,
     pool: FeaturePool,
     edges: np.ndarray,
-    settings: TrainingSettings,
+    settings: ContourTrainingSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Binned features (N, n) and soft labels (n,) of the chosen pixels."""
     codes, labels = [], []

@@ -25,7 +25,7 @@ from vermilion.correction.repose import ANCHORS, apply_motion, repose_motion, sm
 from vermilion.correction.surface_quality import LipSurface
 from vermilion.correction.unfold import Unfolder
 from vermilion.faces.model import FaceModel
-from vermilion.features.contour_features import interocular_px
+from vermilion.features.contour_features import facing_interocular_px
 from vermilion.features.occluding import OccludingContour
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.cotangents import bending_stiffness
@@ -120,7 +120,9 @@ class ImageAgreement:
         """
         rotation, translation_mm = take.rotation, take.translation_mm
         lines, frames = image.lines(), range(len(take))
-        unit_px = np.array([interocular_px(v[self._eyes], image.camera) for v in take.coarse_mm])
+        unit_px = np.array(
+            [facing_interocular_px(v[self._eyes], image.camera) for v in take.coarse_mm]
+        )
         seen = [self._seen(head_mm[f], rotation[f], translation_mm[f], image, f) for f in frames]
         if self.settings.repose and seen:
             rotation, translation_mm = self._reposed(

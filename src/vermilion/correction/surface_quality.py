@@ -94,7 +94,7 @@ class LipSurface:
         sides = lip_sides(face, with_inside=True)
         corners = sides[face.triangles]
         one_lip = (corners == corners[:, :1]).all(axis=1) & (corners[:, 0] != 0)
-        self._pairs = neighbours(face.triangles, np.flatnonzero(one_lip))
+        self._pairs = adjacent_triangles(face.triangles, np.flatnonzero(one_lip))
         red = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
         self._red = np.flatnonzero(red[face.triangles].all(axis=1))
         inside = face.regions["mouth_inner"] & ~red
@@ -193,7 +193,7 @@ class LipSurface:
         return float((areas * before).sum() / max(areas.sum(), 1e-9))
 
 
-def neighbours(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+def adjacent_triangles(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Pairs (n, 2) of `chosen` (k,) triangle ids of `triangles` (T, 3) that share an edge."""
     edges = np.sort(triangles[chosen][:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
     order = np.lexsort(edges.T)

@@ -163,7 +163,7 @@ def find_correspondence(
         ValueError: fewer than six landmark pairs, or no matched triangle near the mouth.
     """
     triangles = coarse.mesh.triangles
-    registered = register_neutral(coarse, accurate, settings)
+    registered = register_coarse_neutral(coarse, accurate, settings)
     vertices = bind_vertices(
         registered,
         accurate.mesh,
@@ -191,7 +191,7 @@ def find_correspondence(
     return correspondence, registered
 
 
-def register_neutral(
+def register_coarse_neutral(
     coarse: MarkedMesh, accurate: MarkedMesh, settings: CorrespondenceSettings
 ) -> Mesh:
     """The coarse neutral laid over the accurate one, in the accurate one's frame, mm.

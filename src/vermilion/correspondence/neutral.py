@@ -30,7 +30,7 @@ from vermilion.tracking.result import TrackedTake
 
 
 @dataclass(frozen=True)
-class Neutral:
+class NeutralFrame:
     """A take's first frame.
 
     Attributes:
@@ -61,7 +61,7 @@ class Neutral:
         *,
         subject: str,
         take: str,
-    ) -> Neutral:
+    ) -> NeutralFrame:
         """Take the first frame. Raises InputError where it was not tracked."""
         frame = int(fit.frames[0])
         row = np.flatnonzero(track.frames == frame)
@@ -88,7 +88,7 @@ class Neutral:
 
 
 def correspond_neutrals(
-    neutral: Neutral,
+    neutral: NeutralFrame,
     tracker: FaceModel,
     template: FaceModel,
     landmarks: Literal["image", "model"],
@@ -135,7 +135,7 @@ def correspond_neutrals(
 
 
 def _marked(
-    neutral: Neutral, tracker: FaceModel, template: FaceModel, landmarks: str
+    neutral: NeutralFrame, tracker: FaceModel, template: FaceModel, landmarks: str
 ) -> tuple[MarkedMesh, MarkedMesh]:
     """C in its head frame and H in the world, with landmarks and regions."""
     marked = []

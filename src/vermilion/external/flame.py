@@ -80,7 +80,7 @@ class Flame:
         return (self.weights[:, :, None] * moved).sum(axis=1)
 
 
-def read_model(request: Request) -> Flame:
+def read_flame_model(request: Request) -> Flame:
     """Read the model file that the request names.
 
     Raises InputError where there is none, or its arrays are not those of FLAME.
@@ -125,7 +125,7 @@ def read_flame(request: Request, parameters: Mapping[str, np.ndarray]) -> RawSeq
         raise request.error(
             f"no {', '.join(missing)}", f"{', '.join(_NEEDED)}", "Export the parameters again."
         )
-    model = read_model(request)
+    model = read_flame_model(request)
     expr = np.atleast_2d(parameters["expr"])
     numbers = np.asarray(parameters.get("frames", np.arange(len(expr)))).astype(int).tolist()
     lost = request.absent(numbers)

@@ -84,7 +84,7 @@ class ContourSampler:
         def to_pixels(points: np.ndarray) -> np.ndarray:
             return points if pose is None else camera.project(points @ rotation.T + translation)
 
-        unit = unit_px = interocular_px(vertices_mm[self.eye_corners], camera)
+        unit = unit_px = facing_interocular_px(vertices_mm[self.eye_corners], camera)
         model_outer, model_inner = (r.points(vertices_mm) for r in (self.outer, self.inner))
         if pose is None:
             model_outer, model_inner = camera.project(model_outer), camera.project(model_inner)
@@ -123,7 +123,7 @@ def lip_thickness(outer_px: np.ndarray, inner_px: np.ndarray, n: int) -> np.ndar
     return np.interp(places, np.arange(len(apart) + 1), np.append(apart, apart[0]))
 
 
-def interocular_px(corners_mm: np.ndarray, camera: Camera) -> float:
+def facing_interocular_px(corners_mm: np.ndarray, camera: Camera) -> float:
     """Distance of eye corners `corners_mm` (2, 3), world, as it would look parallel to the image, px.
 
     Unlike the distance of the projected corners it does not shrink when the head turns.

@@ -28,7 +28,7 @@ def model_files(folder: str | Path) -> list[Path]:
     return []
 
 
-def read_model(folder: str | Path) -> pycolmap.Reconstruction:
+def read_colmap_model(folder: str | Path) -> pycolmap.Reconstruction:
     """Read a model without its points.
 
     Raises:

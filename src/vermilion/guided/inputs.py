@@ -29,7 +29,7 @@ def sketch_cameras(
     return {**cameras, tracked.name: tracked if of_track else cameras.get(tracked.name, tracked)}
 
 
-def read_views(
+def read_sketch_views(
     paths: Sequence[str | Path], cameras: Mapping[str, Camera], frame: int
 ) -> list[tuple[Sketch, Camera]]:
     """Sketches of one frame with the cameras of their images.

@@ -9,7 +9,7 @@ import numpy as np
 
 from vermilion.geometry.camera import Camera
 from vermilion.guided.curves import mouth_axes
-from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
+from vermilion.guided.silhouette import ContourSurface, Segments, inner_silhouettes, outer_contours
 from vermilion.guided.sketch import Sketch
 from vermilion.imaging.draw import draw_points, label
 
@@ -21,7 +21,7 @@ _MARGIN = 0.6  # of the contours' extent
 def draw_refinement(
     image: np.ndarray,
     camera: Camera,
-    surface: LipSurface,
+    surface: ContourSurface,
     before_mm: np.ndarray,
     after_mm: np.ndarray,
     sketch: Sketch | None = None,

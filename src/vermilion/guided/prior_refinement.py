@@ -22,8 +22,8 @@ from vermilion.correction.constraints import LinearConstraints
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.camera import Camera
 from vermilion.guided.lip_prior import LipPrior
-from vermilion.guided.refinement import RefinementSettings, View, ray_constraints
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.refinement import RefinementSettings, SketchView, ray_constraints
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.guided.sketch import Sketch
 from vermilion.storage.errors import InputError
 
@@ -74,7 +74,7 @@ class PriorRefiner:
         self,
         neutral_mm: np.ndarray,
         prior: LipPrior,
-        surface: LipSurface,
+        surface: ContourSurface,
         stable: np.ndarray,
         noise: HandNoise | None = None,
         rounds: int = 4,
@@ -118,7 +118,7 @@ class PriorRefiner:
         mean, among = self.prior.mean(z), self.prior.kernel(z[rows], z[rows])
         among = among + self.prior.shares[2] * np.eye(len(rows))
         settings = RefinementSettings()
-        ready = [[View.of(s, c, settings) for s, c in views[int(row)]] for row in rows]
+        ready = [[SketchView.of(s, c, settings) for s, c in views[int(row)]] for row in rows]
         current, shift = mean[rows].copy(), np.zeros((len(rows), 3))
         for _ in range(self._rounds):
             found = [
@@ -157,7 +157,7 @@ class PriorRefiner:
         coefficients: np.ndarray,
         shift_mm: np.ndarray,
         mean: np.ndarray,
-        views: Sequence[View],
+        views: Sequence[SketchView],
     ) -> tuple[np.ndarray, np.ndarray]:
         """J^T N^-1 J (p, p) and J^T N^-1 (r - J m) (p,) of a frame; p: r modes and the head's shift."""
         count = len(coefficients)
@@ -192,7 +192,7 @@ class PriorRefiner:
         )
         return result
 
-    def _noise_covariance(self, view: View, at_mm: np.ndarray) -> np.ndarray:
+    def _noise_covariance(self, view: SketchView, at_mm: np.ndarray) -> np.ndarray:
         """(2n, 2n) mm2 of the rays of a stroke whose n points are at (n, 3)."""
         noise, places = self._noise, np.linspace(0.0, 1.0, len(at_mm))
         distance = np.linalg.norm(at_mm - view.camera.centre_mm, axis=1).mean()

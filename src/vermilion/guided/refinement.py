@@ -27,7 +27,7 @@ from vermilion.geometry.sparse import CholeskyFactor
 from vermilion.guided.constrained_energy import ConstrainedEnergy
 from vermilion.guided.curves import mouth_axes, press_together, resampled
 from vermilion.guided.regions import GuidedRegions, movable_vertices
-from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
+from vermilion.guided.silhouette import ContourSurface, Segments, inner_silhouettes, outer_contours
 from vermilion.guided.sketch import Sketch
 from vermilion.storage.errors import InputError
 
@@ -81,7 +81,7 @@ class Refined:
 
 
 @dataclass(frozen=True)
-class View:
+class SketchView:
     """A sketch, the camera that took the image, and its curves made ready.
 
     Attributes:
@@ -97,7 +97,7 @@ class View:
     weights: dict[str, float]
 
     @classmethod
-    def of(cls, sketch: Sketch, camera: Camera, settings: RefinementSettings) -> View:
+    def of(cls, sketch: Sketch, camera: Camera, settings: RefinementSettings) -> SketchView:
         """Raises InputError where the sketch is not one of the camera's image."""
         size = (camera.width_px, camera.height_px)
         if tuple(sketch.image_size_px) != size:
@@ -121,7 +121,7 @@ class View:
                 samples[names[0]], samples[names[1]], *_ = press_together(upper, lower, along, up)
         return cls(camera, up, samples, weights)
 
-    def contours(self, vertices_mm: np.ndarray, surface: LipSurface) -> dict[str, Segments]:
+    def contours(self, vertices_mm: np.ndarray, surface: ContourSurface) -> dict[str, Segments]:
         """Curve name -> where that contour of a mesh vertices_mm (V, 3) is now.
 
         Raises InputError where the camera sees no such contour.
@@ -152,14 +152,14 @@ class SketchRefiner:
     def __init__(
         self,
         regions: GuidedRegions,
-        surface: LipSurface,
+        surface: ContourSurface,
         crossings: LipCrossings | None = None,
         settings: RefinementSettings | None = None,
     ):
         """Prepare a topology.
 
         Args:
-            surface: where contours are looked for (`LipSurface.of_face`, `.of_regions`).
+            surface: where contours are looked for (`ContourSurface.of_face`, `.of_regions`).
             crossings: the lips, to separate where one would pass through the other; None: the paper.
         """
         self.settings = settings or RefinementSettings()
@@ -181,7 +181,7 @@ class SketchRefiner:
             InputError: no sketch, a sketch of another image, a mesh that is not finite, or a camera
                 that does not see the contour.
         """
-        ready = [View.of(sketch, camera, self.settings) for sketch, camera in views]
+        ready = [SketchView.of(sketch, camera, self.settings) for sketch, camera in views]
         if not ready:
             raise InputError("no sketch", "one or more of the frame", "Draw the lips first.")
         current = np.array(vertices_mm, dtype=np.float64)
@@ -200,7 +200,7 @@ class SketchRefiner:
         depth = self._crossings.find(current).deepest_mm if self._crossings else 0.0
         return Refined(current, distance, depth)
 
-    def _view_constraints(self, vertices_mm: np.ndarray, view: View) -> LinearConstraints:
+    def _view_constraints(self, vertices_mm: np.ndarray, view: SketchView) -> LinearConstraints:
         found = []
         for name, segments in view.contours(vertices_mm, self._surface).items():
             points, _ = segments.nearest(view.samples[name])
@@ -226,7 +226,7 @@ class SketchRefiner:
             moved[self.movable] += self._energy.minimise(constraints)
         return moved
 
-    def _distances(self, vertices_mm: np.ndarray, view: View) -> dict[str, np.ndarray]:
+    def _distances(self, vertices_mm: np.ndarray, view: SketchView) -> dict[str, np.ndarray]:
         found = view.contours(vertices_mm, self._surface)
         return {name: found[name].nearest(view.samples[name])[1] for name in found}
 

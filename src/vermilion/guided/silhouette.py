@@ -46,7 +46,7 @@ class SurfaceEdges:
 
 
 @dataclass(frozen=True)
-class LipSurface:
+class ContourSurface:
     """The part of a mesh on which contours are looked for.
 
     Attributes:
@@ -67,14 +67,14 @@ class LipSurface:
     outer_lower: SurfaceEdges
 
     @classmethod
-    def of_regions(cls, regions: GuidedRegions) -> LipSurface:
+    def of_regions(cls, regions: GuidedRegions) -> ContourSurface:
         """The predicted triangles of any topology: no sides, no outer contour."""
         nobody = np.zeros(regions.n_vertices, dtype=np.int8)
         none = np.zeros((0, 2), dtype=np.int64)
         return cls._of(regions.triangles, regions.predicted, nobody, (none, none))
 
     @classmethod
-    def of_face(cls, face: FaceModel, regions: GuidedRegions) -> LipSurface:
+    def of_face(cls, face: FaceModel, regions: GuidedRegions) -> ContourSurface:
         """The lips of a face model and the predicted triangles, with sides and outer contour."""
         sides = lip_sides(face, with_inside=True)
         of_lips = (sides != 0)[face.triangles].all(axis=1)
@@ -88,7 +88,7 @@ class LipSurface:
         candidates: np.ndarray,
         sides: np.ndarray,
         outer: tuple[np.ndarray, np.ndarray],
-    ) -> LipSurface:
+    ) -> ContourSurface:
         touched = np.zeros(len(sides), dtype=bool)
         touched[triangles[candidates]] = True
         around = triangles[touched[triangles].any(axis=1)]
@@ -158,7 +158,7 @@ class Segments:
 
 
 def inner_silhouettes(
-    vertices_mm: np.ndarray, surface: LipSurface, camera: Camera, up: np.ndarray
+    vertices_mm: np.ndarray, surface: ContourSurface, camera: Camera, up: np.ndarray
 ) -> tuple[Segments, Segments]:
     """(upper, lower) silhouettes of the lips, told by the projected normal.
 
@@ -179,7 +179,7 @@ def inner_silhouettes(
 
 
 def outer_contours(
-    vertices_mm: np.ndarray, surface: LipSurface, camera: Camera
+    vertices_mm: np.ndarray, surface: ContourSurface, camera: Camera
 ) -> tuple[Segments, Segments]:
     """(upper, lower) border of the red, which is a line of the mesh.
 
@@ -204,7 +204,7 @@ def outer_halves(face: FaceModel) -> tuple[np.ndarray, np.ndarray]:
     return edges[on_upper], edges[~on_upper]
 
 
-def _normals(vertices_mm: np.ndarray, surface: LipSurface) -> np.ndarray:
+def _normals(vertices_mm: np.ndarray, surface: ContourSurface) -> np.ndarray:
     """Area-weighted normals (V, 3); zero away from the surface."""
     cross = triangle_cross(vertices_mm, surface.around)
     result = np.zeros((len(vertices_mm), 3))
@@ -217,7 +217,7 @@ def _normals(vertices_mm: np.ndarray, surface: LipSurface) -> np.ndarray:
 
 
 def _zero_segments(
-    vertices_mm: np.ndarray, normals: np.ndarray, surface: LipSurface, camera: Camera
+    vertices_mm: np.ndarray, normals: np.ndarray, surface: ContourSurface, camera: Camera
 ) -> Segments:
     """Segments where normal . view = 0 inside triangles, and the mesh's own ends that face us."""
     corners = surface.triangles[surface.candidates]

@@ -11,7 +11,7 @@ from vermilion.storage.errors import RefusedInputError
 
 
 @dataclass(frozen=True)
-class Layer:
+class ExrLayer:
     """Channels of an EXR file that belong together.
 
     Attributes:
@@ -40,7 +40,7 @@ class Layer:
         return self.rgb or tuple(self.channels.values())[:3]
 
 
-def layers_of(stream: oiio.ImageInput) -> list[Layer]:
+def layers_of(stream: oiio.ImageInput) -> list[ExrLayer]:
     """Layers of an open EXR file, in the file's order."""
     layers: dict[tuple[str, int], dict[str, int]] = {}
     part = 0
@@ -52,7 +52,7 @@ def layers_of(stream: oiio.ImageInput) -> list[Layer]:
             layers.setdefault((name or part_name, part), {})[short] = index
         part += 1
     stream.seek_subimage(0, 0)
-    return [Layer(name, part, channels) for (name, part), channels in layers.items()]
+    return [ExrLayer(name, part, channels) for (name, part), channels in layers.items()]
 
 
 def _parts(spec: oiio.ImageSpec) -> bool:
@@ -60,7 +60,7 @@ def _parts(spec: oiio.ImageSpec) -> bool:
     return spec.get_int_attribute("oiio:subimages", 1) > 1
 
 
-def choose_layer(layers: list[Layer], wanted: str, path: Path, **place) -> Layer:
+def choose_layer(layers: list[ExrLayer], wanted: str, path: Path, **place) -> ExrLayer:
     """The layer that is the image.
 
     A file of one layer, or with plain R, G and B in its first part, is read as it is where no layer

@@ -13,7 +13,7 @@ from vermilion.imaging.source import Source
 from vermilion.storage.errors import InputError
 
 
-def read_views(
+def read_camera_images(
     source: Source, rig: str | Path, frontal: str, frame: int, **place
 ) -> list[tuple[Camera, np.ndarray]]:
     """(camera, linear image) of every camera whose image can be read; the others are logged.

@@ -106,8 +106,8 @@ def describe(
     aligned = cv2.GaussianBlur(aligned, (0, 0), settings.blur_px)
     pixels = np.clip(np.rint(aligned * 255), 0, 255).astype(np.uint8)
     uniform, plain = uniform_code(lbp8(pixels)), lbp4(pixels)
-    regions = tuple(histograms(uniform, plain, tiles) for tiles in reference.regions)
-    return FacePatterns(regions, histograms(uniform, plain, reference.patches))
+    regions = tuple(code_histograms(uniform, plain, tiles) for tiles in reference.regions)
+    return FacePatterns(regions, code_histograms(uniform, plain, reference.patches))
 
 
 def align(grey: np.ndarray, points_px: np.ndarray, reference: ReferenceShape) -> np.ndarray:
@@ -170,7 +170,7 @@ def uniform_code(codes: np.ndarray) -> np.ndarray:
     return _UNIFORM[codes]
 
 
-def histograms(uniform: np.ndarray, plain: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def code_histograms(uniform: np.ndarray, plain: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     """Shares of codes in boxes.
 
     Args:

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from vermilion.landmarks.correction import (
-    CorrectionSettings,
     FlowPoints,
-    blend,
-    join,
+    LandmarkCorrectionSettings,
+    blend_points,
+    flow_trust,
+    join_ways,
     rough_shapes,
-    trust,
 )
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.flow import FaceFlow
@@ -29,11 +29,11 @@ from vermilion.landmarks.scheme import N_LANDMARKS
 from vermilion.storage.frames import readable
 
 
-def settle(
+def correct_key_frames(
     read_grey: Callable[[int], np.ndarray],
     track: LandmarkTrack,
     keys: KeyFrames,
-    settings: CorrectionSettings | None = None,
+    settings: LandmarkCorrectionSettings | None = None,
 ) -> KeyFrames:
     """The key frames with points of those `between` corrected by flow from the others.
 
@@ -44,7 +44,7 @@ def settle(
         track: detected landmarks of the whole take, without the offset from the given ones.
         keys: of the same take.
     """
-    settings = settings or CorrectionSettings()
+    settings = settings or LandmarkCorrectionSettings()
     between = keys.kinds == BETWEEN
     key_rows = np.searchsorted(track.frames, keys.frames)
     ends, wanted = key_rows[~between], key_rows[between]
@@ -71,11 +71,11 @@ def settle(
         ]
         start, end = spans[0].start, spans[-1].start
         later = (rows - start) / (end - start) if len(spans) == 2 else None
-        points[at], confidence[at] = join(ways, later)
+        points[at], confidence[at] = join_ways(ways, later)
     flow = FlowPoints(points, confidence)
     settled = keys.points_px.copy()
     nobody = np.zeros(len(wanted), dtype=bool)
-    settled[between] = blend(track, wanted, flow, nobody, settings).points_px
+    settled[between] = blend_points(track, wanted, flow, nobody, settings).points_px
     return replace(keys, points_px=settled)
 
 
@@ -86,7 +86,7 @@ def _carried(
     points_px: np.ndarray,
     wanted: np.ndarray,
     shapes: np.ndarray,
-    settings: CorrectionSettings,
+    settings: LandmarkCorrectionSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 66, 2) of the first row of a way in n wanted rows of it, and trust (n, 66)."""
     engine, points, astray = FaceFlow(settings.face_px), onto_lips(points_px), np.zeros(N_LANDMARKS)
@@ -101,5 +101,5 @@ def _carried(
         last, last_row = grey, row
         if row in wanted:
             found[wanted == row] = off_lips(points)
-            sure[wanted == row] = trust(astray, shapes[row], settings)
+            sure[wanted == row] = flow_trust(astray, shapes[row], settings)
     return found, sure

@@ -29,7 +29,7 @@ FILLED = "no face found; filled by the flow"
 
 
 @dataclass(frozen=True)
-class CorrectionSettings:
+class LandmarkCorrectionSettings:
     """How detector and flow share.
 
     Attributes:
@@ -52,7 +52,7 @@ class CorrectionSettings:
     fill_confidence: float = 0.5
 
     @classmethod
-    def of(cls, section: Mapping[str, Any]) -> CorrectionSettings:
+    def of(cls, section: Mapping[str, Any]) -> LandmarkCorrectionSettings:
         """From the section `landmarks.correction` of the configuration."""
         return cls(**{key: value for key, value in section.items() if key != "mode"})
 
@@ -78,12 +78,12 @@ class FlowPoints:
     confidence: np.ndarray
 
 
-def correct(
+def correct_landmarks(
     read_grey: Callable[[int], np.ndarray],
     detected: LandmarkTrack,
     keys: KeyFrames,
     frames: Sequence[int],
-    settings: CorrectionSettings | None = None,
+    settings: LandmarkCorrectionSettings | None = None,
 ) -> tuple[LandmarkTrack, list[QualityRow]]:
     """Corrected landmarks of some frames of a take, and quality rows.
 
@@ -95,12 +95,12 @@ def correct(
         keys: of the same take.
         frames: frame numbers, ascending.
     """
-    settings = settings or CorrectionSettings()
+    settings = settings or LandmarkCorrectionSettings()
     unbiased = without_offset(detected, keys.given)
     rows = np.searchsorted(detected.frames, frames)
     flow = flow_points(read_grey, unbiased, keys, rows, settings)
     at_key = np.isin(detected.frames[rows], list(keys.given))
-    track = blend(unbiased, rows, flow, at_key, settings)
+    track = blend_points(unbiased, rows, flow, at_key, settings)
     return track, quality_rows(detected, rows, track, flow)
 
 
@@ -109,7 +109,7 @@ def flow_points(
     track: LandmarkTrack,
     keys: KeyFrames,
     rows: np.ndarray,
-    settings: CorrectionSettings,
+    settings: LandmarkCorrectionSettings,
 ) -> FlowPoints:
     """Flow from the key frames before and after, for some rows of a take's track.
 
@@ -177,13 +177,15 @@ def _clip_points(read_grey, frames, span, shapes, ends, settings):
     if ends[1] is not None:
         back = carry_along([flow.reversed() for flow in flows[::-1]], onto_lips(ends[1]))
         paths.append((back[0][::-1], back[1][::-1]))
-    ways = [(off_lips(path), trust(astray, shapes[read], settings)) for path, astray in paths]
+    ways = [(off_lips(path), flow_trust(astray, shapes[read], settings)) for path, astray in paths]
     later = (np.asarray(read) - span[0]) / (span[-1] - span[0]) if len(ways) == 2 else None
-    points[at], confidence[at] = join(ways, later)
+    points[at], confidence[at] = join_ways(ways, later)
     return points, confidence
 
 
-def trust(astray_px: np.ndarray, shapes: np.ndarray, settings: CorrectionSettings) -> np.ndarray:
+def flow_trust(
+    astray_px: np.ndarray, shapes: np.ndarray, settings: LandmarkCorrectionSettings
+) -> np.ndarray:
     """How sure flow is, (..., 66) in [0, 1], that does not lead back to where it started.
 
     Args:
@@ -194,7 +196,7 @@ def trust(astray_px: np.ndarray, shapes: np.ndarray, settings: CorrectionSetting
     return 1 / (1 + (astray_px / tolerance) ** 2)
 
 
-def join(
+def join_ways(
     ways: Sequence[tuple[np.ndarray, np.ndarray]], later: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 66, 2) and confidence (n, 66) of flow from the key frame before and the one after.
@@ -212,12 +214,12 @@ def join(
     return weights[0] * ways[0][0] + weights[1] * ways[1][0], confidence
 
 
-def blend(
+def blend_points(
     track: LandmarkTrack,
     rows: np.ndarray,
     flow: FlowPoints,
     at_given: np.ndarray,
-    settings: CorrectionSettings,
+    settings: LandmarkCorrectionSettings,
 ) -> LandmarkTrack:
     """Detected and flow points together (Mono13 eq. 4), for some rows of a track.
 

@@ -41,7 +41,7 @@ class FrameLooks:
 
     @classmethod
     def of(cls, looks: list[tuple[np.ndarray, np.ndarray]]) -> FrameLooks:
-        """Of `looks`, thumbnail (18, 32, 3) and colours (216,) of each frame, as `look_of` gives them."""
+        """Of `looks`, thumbnail (18, 32, 3) and colours (216,) of each frame, as `frame_look` gives them."""
         return cls(np.stack([t for t, _ in looks]), np.stack([c for _, c in looks]))
 
     @property
@@ -63,7 +63,7 @@ def _spread(images: np.ndarray) -> np.ndarray:
     return np.abs(images - images.mean(axis=(-3, -2), keepdims=True)).mean(axis=(-3, -2, -1))
 
 
-def look_of(linear_rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def frame_look(linear_rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Thumbnail (18, 32, 3) uint8 and colours (216,) float32 of an image `linear_rgb` (h, w, 3)."""
     small = cv2.resize(
         linear_rgb, (2 * THUMBNAIL[0], 2 * THUMBNAIL[1]), interpolation=cv2.INTER_AREA

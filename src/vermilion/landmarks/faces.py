@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vermilion.landmarks.cuts import FrameLooks, look_of, no_look
+from vermilion.landmarks.cuts import FrameLooks, frame_look, no_look
 from vermilion.landmarks.detector import Landmarks
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.scheme import JAW, N_LANDMARKS, face_size_px, interocular_px
@@ -175,7 +175,7 @@ def find_faces(
         image, reason, found, look = None, "", [], no_look()
         try:
             image = read(frame)
-            look, size = look_of(image), (image.shape[1], image.shape[0])
+            look, size = frame_look(image), (image.shape[1], image.shape[0])
         except InputError as error:
             reason = str(error)
         try:

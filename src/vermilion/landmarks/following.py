@@ -110,7 +110,7 @@ class FollowedFace:
         return cls(**read_arrays(path, "file of the followed face", cls.__dataclass_fields__))
 
 
-def follow(seen: SeenFaces, choice: FaceChoice, one_shot: bool = False) -> FollowedFace:
+def follow_face(seen: SeenFaces, choice: FaceChoice, one_shot: bool = False) -> FollowedFace:
     """Choose and follow one face.
 
     Args:

@@ -30,7 +30,7 @@ def label_files(capture: Source) -> list[Path]:
     return sorted((folder_of(capture, "labels") / "landmarks").glob("*/*.json"))
 
 
-def read_label(path: str | Path) -> LandmarkLabel:
+def read_landmark_label(path: str | Path) -> LandmarkLabel:
     """Read one file of 66 points (or 68, whose inner mouth corners are left out)."""
     path = Path(path)
     try:
@@ -60,10 +60,10 @@ def read_label(path: str | Path) -> LandmarkLabel:
 def read_labels(capture: Source) -> Iterator[LandmarkLabel]:
     """All labels of a capture folder."""
     for path in label_files(capture):
-        yield read_label(path)
+        yield read_landmark_label(path)
 
 
-def check_label(label: LandmarkLabel, size_px: tuple[int, int], **place: Any) -> None:
+def check_landmark_label(label: LandmarkLabel, size_px: tuple[int, int], **place: Any) -> None:
     """Raise InputError where a label does not lie in its image of `size_px` (width, height)."""
     named = {"camera": label.camera, "frame": label.frame}
     check_in_image(label.points_px, size_px, False, label.path, **named, **place)
@@ -76,7 +76,7 @@ def labels_by_frame(
 
     Raises InputError where a file is damaged, or its points do not lie in images of `size_px`.
     """
-    labels = [read_label(path) for path in paths]
+    labels = [read_landmark_label(path) for path in paths]
     for label in labels:
-        check_label(label, size_px, **place)
+        check_landmark_label(label, size_px, **place)
     return {label.frame: label.points_px for label in labels}

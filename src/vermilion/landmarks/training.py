@@ -16,7 +16,7 @@ from vermilion.landmarks.descent import (
     stage_sizes,
 )
 from vermilion.landmarks.gradients import grey_of
-from vermilion.landmarks.labels import LandmarkLabel, check_label
+from vermilion.landmarks.labels import LandmarkLabel, check_landmark_label
 from vermilion.landmarks.locate import train_locator
 from vermilion.landmarks.scheme import MIRROR, N_LANDMARKS, face_size_px
 from vermilion.storage.errors import InputError
@@ -28,7 +28,7 @@ _SURE_RADIUS = 0.035
 
 
 @dataclass(frozen=True)
-class TrainingSettings:
+class LandmarkTrainingSettings:
     """As the section `landmarks.training` of the configuration describes them."""
 
     stages: int = 5
@@ -60,14 +60,16 @@ def labelled_images(
     for index in chosen:
         source, label = labels[index]
         image = source.read(label.camera, label.frame)
-        check_label(label, image.shape[1::-1])
+        check_landmark_label(label, image.shape[1::-1])
         images.append(image)
         points.append(label.points_px)
     return images, np.array(points)
 
 
 def train_descent(
-    images: Sequence[np.ndarray], points: np.ndarray, settings: TrainingSettings | None = None
+    images: Sequence[np.ndarray],
+    points: np.ndarray,
+    settings: LandmarkTrainingSettings | None = None,
 ) -> DescentDetector:
     """Learn the locator, the mean shape, the steps and the sureness.
 
@@ -75,7 +77,7 @@ def train_descent(
         images: N images (h, w, 3), linear RGB.
         points: (N, 66, 2) px.
     """
-    settings = settings or TrainingSettings()
+    settings = settings or LandmarkTrainingSettings()
     rng = np.random.default_rng(settings.seed)
     greys = [grey_of(image) for image in images]
     locator = train_locator(greys, points, settings.seed)
@@ -131,7 +133,10 @@ def _normalised(shape: np.ndarray) -> np.ndarray:
 
 
 def _start(
-    shape: np.ndarray, mean: np.ndarray, rng: np.random.Generator, settings: TrainingSettings
+    shape: np.ndarray,
+    mean: np.ndarray,
+    rng: np.random.Generator,
+    settings: LandmarkTrainingSettings,
 ) -> np.ndarray:
     """The mean shape in the face's box, misplaced as a locator would."""
     size = face_size_px(shape)

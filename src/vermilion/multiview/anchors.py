@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from vermilion.geometry.raycast import RayCaster
-from vermilion.multiview.motion import Reference
+from vermilion.multiview.motion import ReferenceFrame
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.refine import FrameMatchSettings, register_frame
 from vermilion.multiview.views import Frame
@@ -85,7 +85,7 @@ def clip_frames_of(
 
 
 def find_anchor(
-    reference: Reference,
+    reference: ReferenceFrame,
     window: Sequence[int],
     load: LoadFrame,
     matcher: FlowMatcher,
@@ -117,7 +117,7 @@ def choose_anchor(similarity: np.ndarray, threshold: float) -> int | None:
     return int(np.argmax(known))
 
 
-def similarities(reference: Reference, frames: Sequence[int], load: LoadFrame) -> np.ndarray:
+def similarities(reference: ReferenceFrame, frames: Sequence[int], load: LoadFrame) -> np.ndarray:
     """Correlation (F,) of each frame's images with the reference's where the mesh is seen there.
 
     The mean over the cameras; NaN where the frame cannot be read.

@@ -44,7 +44,7 @@ class DriftSettings:
 
 
 @dataclass(frozen=True)
-class Origin:
+class NeutralImages:
     """The neutral's images, at the size at which frames are compared with them.
 
     Attributes:
@@ -60,7 +60,7 @@ class Origin:
     regions: dict[str, np.ndarray]
 
     @classmethod
-    def of(cls, frame: Frame, neutral_mm: np.ndarray, model: FaceModel) -> Origin:
+    def of(cls, frame: Frame, neutral_mm: np.ndarray, model: FaceModel) -> NeutralImages:
         """From the neutral's frame and its mesh neutral_mm (V, 3), world."""
         neutral_mm = np.asarray(neutral_mm, dtype=np.float64)
         named = model.regions
@@ -95,7 +95,7 @@ class Carried:
 
 
 def carry(
-    origin: Origin,
+    origin: NeutralImages,
     frame: Frame,
     vertices_mm: np.ndarray,
     matcher: FlowMatcher,
@@ -129,7 +129,7 @@ def carry(
     return found
 
 
-def neighbours(frame: Frame, target_mm: np.ndarray) -> dict[str, str]:
+def neighbouring_cameras(frame: Frame, target_mm: np.ndarray) -> dict[str, str]:
     """Camera -> the other camera of a frame that sees target_mm (3,) from the nearest direction.
 
     Cameras of like resolution go first.
@@ -147,7 +147,7 @@ def neighbours(frame: Frame, target_mm: np.ndarray) -> dict[str, str]:
 
 
 def drift_rows(
-    origin: Origin, frame: Frame, carried: Mapping[str, Carried], scale: float
+    origin: NeutralImages, frame: Frame, carried: Mapping[str, Carried], scale: float
 ) -> list[dict]:
     """A row of all cameras together, then one a camera: camera, figures, reason.
 
@@ -188,7 +188,7 @@ class _Samples:
     length_mm: dict[str, np.ndarray]
 
 
-def _samples(origin: Origin, found: Carried, scale: float) -> _Samples:
+def _samples(origin: NeutralImages, found: Carried, scale: float) -> _Samples:
     measured = found.seen & (found.motion.weight > 0)
     length = np.linalg.norm(found.motion.offset_px, axis=1)
     difference, length_px, length_mm = {}, {}, {}

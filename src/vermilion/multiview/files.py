@@ -16,7 +16,7 @@ from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 
 
-def read_views(
+def read_landmark_views(
     path: str | Path, wanted: Collection[str]
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Landmarks of the neutral in the cameras of `wanted`.

@@ -17,7 +17,7 @@ from vermilion.multiview.views import Frame
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceFrame:
     """A frame whose mesh is known, and what its cameras see of it.
 
     Attributes:
@@ -43,7 +43,7 @@ class Reference:
         vertices_mm: np.ndarray,
         triangles: np.ndarray,
         plate: ThinPlate | None = None,
-    ) -> Reference:
+    ) -> ReferenceFrame:
         """Of a frame and its mesh.
 
         Args:

@@ -13,13 +13,13 @@ from vermilion.imaging.draw import label as write_label
 from vermilion.multiview.neutral import Neutral
 from vermilion.multiview.pairs import density
 from vermilion.multiview.stereo import Cloud
-from vermilion.multiview.take import RefinedFrame
+from vermilion.multiview.take import AccurateFrame
 from vermilion.multiview.views import Frame, View
 
 _HEIGHT_PX = 360
 
 
-def label(image: np.ndarray, text: str) -> np.ndarray:
+def labelled(image: np.ndarray, text: str) -> np.ndarray:
     """An image (h, w, 3) uint8 at the sheet's size with a line of text, (h', w', 3) uint8."""
     high = image.shape[0] > _HEIGHT_PX
     return write_label(resized_to_height(image, _HEIGHT_PX) if high else image, text)
@@ -127,12 +127,14 @@ def neutral_sheet(
         landmarks = camera.project(neutral.landmarks.points_mm)
         surface = neutral.surface
         images += [
-            label(draw_points(image, landmarks, (255, 80, 80)), f"{name}: landmarks"),
-            label(show_wires(view, neutral.vertices_mm, edges), "template"),
-            label(show_cloud(camera, neutral.cloud), "stereo points"),
-            label(draw_mesh(0 * image, camera, surface.vertices_mm, surface.triangles), "Poisson"),
-            label(draw_mesh(0 * image, camera, neutral.vertices_mm, triangles), "mesh"),
-            label(
+            labelled(draw_points(image, landmarks, (255, 80, 80)), f"{name}: landmarks"),
+            labelled(show_wires(view, neutral.vertices_mm, edges), "template"),
+            labelled(show_cloud(camera, neutral.cloud), "stereo points"),
+            labelled(
+                draw_mesh(0 * image, camera, surface.vertices_mm, surface.triangles), "Poisson"
+            ),
+            labelled(draw_mesh(0 * image, camera, neutral.vertices_mm, triangles), "mesh"),
+            labelled(
                 draw_mesh(0 * image, camera, neutral.vertices_mm, triangles, colours),
                 "expected error, 0 to 0.3 mm",
             ),
@@ -141,12 +143,12 @@ def neutral_sheet(
             moved = colour_map(neutral.moved_mm, 0.0, 5.0)
             text = f"to the points of {neutral.first_take}, 0 to 5 mm"
             mesh = draw_mesh(0 * image, camera, neutral.vertices_mm, triangles, moved)
-            images.append(label(mesh, text))
+            images.append(labelled(mesh, text))
     return tile(images, 7 if neutral.first_take else 6)
 
 
 def frames_sheet(
-    shown: Sequence[tuple[Frame, RefinedFrame]], triangles: np.ndarray, edges: np.ndarray
+    shown: Sequence[tuple[Frame, AccurateFrame]], triangles: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
     """For some frames of a chunk: wires, mesh, cloud, residual and visibility in two cameras.
 
@@ -168,18 +170,18 @@ def frames_sheet(
             view = frame.views[name]
             empty, camera = 0 * show(view), view.camera
             images += [
-                label(show_wires(view, vertices, edges), f"frame {frame.number} {name}"),
-                label(draw_mesh(empty, camera, vertices, triangles), "mesh"),
-                label(show_cloud(camera, refined.cloud), "stereo points"),
-                label(
+                labelled(show_wires(view, vertices, edges), f"frame {frame.number} {name}"),
+                labelled(draw_mesh(empty, camera, vertices, triangles), "mesh"),
+                labelled(show_cloud(camera, refined.cloud), "stereo points"),
+                labelled(
                     draw_mesh(empty, camera, vertices, triangles, residual),
                     "residual, 0 to 1 px; grey: unseen",
                 ),
-                label(
+                labelled(
                     draw_mesh(empty, camera, vertices, triangles, visible),
                     "cameras, 0 to 10; grey: unseen",
                 ),
             ]
     if not images:  # no frame of the chunk could be registered
-        images = [label(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
+        images = [labelled(np.zeros((60, 480, 3), dtype=np.uint8), "no valid frame to show")]
     return tile(images, 5)

@@ -17,7 +17,7 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.multiview.motion import (
     CloudData,
     Measurements,
-    Reference,
+    ReferenceFrame,
     SolveSettings,
     cloud_planes,
     solve_motion,
@@ -60,7 +60,7 @@ class FrameMatchSettings:
 
 
 def register_frame(
-    levels: Sequence[tuple[Reference, Frame, float]],
+    levels: Sequence[tuple[ReferenceFrame, Frame, float]],
     start_mm: np.ndarray,
     matcher: FlowMatcher,
     settings: FrameMatchSettings,
@@ -98,7 +98,7 @@ def register_frame(
 
 
 def measure_frame(
-    reference: Reference,
+    reference: ReferenceFrame,
     frame: Frame,
     vertices_mm: np.ndarray,
     matcher: FlowMatcher,

@@ -16,7 +16,7 @@ from vermilion.imaging.frames import FrameSource, open_frames
 from vermilion.imaging.source import Source
 from vermilion.multiview.cloud import near_mesh
 from vermilion.multiview.contact import Contact, Lips, lips_of, resolve_contact
-from vermilion.multiview.motion import CloudData, Reference, cloud_planes
+from vermilion.multiview.motion import CloudData, ReferenceFrame, cloud_planes
 from vermilion.multiview.neutral import skin_of, stereo_cloud
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.refine import FrameMatchSettings, Registered, register_frame
@@ -98,7 +98,7 @@ def open_coarse(
     vertices_mm: np.ndarray,
     triangles: np.ndarray,
     scale: float,
-) -> tuple[Reference, Callable[[int], Frame]]:
+) -> tuple[ReferenceFrame, Callable[[int], Frame]]:
     """A frame whose mesh is known, at a smaller size, and a reader of frames of that size.
 
     Args:
@@ -113,11 +113,11 @@ def open_coarse(
     def load(number: int) -> Frame:
         return images.load(number, scale)
 
-    return Reference.of(load(number), vertices_mm, triangles), load
+    return ReferenceFrame.of(load(number), vertices_mm, triangles), load
 
 
 @dataclass(frozen=True)
-class RefinedFrame:
+class AccurateFrame:
     """A frame of H.
 
     Attributes:
@@ -182,7 +182,7 @@ class Refiner:
         frame = images.load(neutral_frame)
         self.plate = ThinPlate.of(self.neutral_mm, model.triangles)
         self.references = {
-            scale: Reference.of(
+            scale: ReferenceFrame.of(
                 images.at(frame, scale), self.neutral_mm, model.triangles, self.plate
             )
             for scale in set(settings.scales)
@@ -199,7 +199,7 @@ class Refiner:
         sights = self.references[self.settings.scales[-1]].sights.values()
         return np.sum([sight.visible for sight in sights], axis=0) >= 2
 
-    def refine(self, number: int, start_mm: np.ndarray) -> RefinedFrame:
+    def refine(self, number: int, start_mm: np.ndarray) -> AccurateFrame:
         """Register a frame from start_mm (V, 3), world; a failure is flagged, not raised.
 
         The neutral's frame is the neutral.
@@ -215,7 +215,7 @@ class Refiner:
 
     def register(
         self, frame: Frame, start_mm: np.ndarray, *, from_afar: bool = False
-    ) -> RefinedFrame:
+    ) -> AccurateFrame:
         """Register the images of a frame, be it of this take or of another one of the person.
 
         Args:
@@ -245,16 +245,16 @@ class Refiner:
         contact = resolve_contact(registered.vertices_mm, self.model.triangles, self.lips, mobility)
         registered = replace(registered, vertices_mm=contact.vertices_mm)
         quality = self._quality(number, frame, registered, contact, cloud)
-        return RefinedFrame(registered, contact, cloud, quality)
+        return AccurateFrame(registered, contact, cloud, quality)
 
-    def _neutral(self, frame: Frame, reference: Reference) -> RefinedFrame:
+    def _neutral(self, frame: Frame, reference: ReferenceFrame) -> AccurateFrame:
         seeing = np.sum([sight.visible for sight in reference.sights.values()], axis=0)
         residual = np.where(seeing > 0, 0.0, np.nan)
         registered = Registered(self.neutral_mm, seeing.astype(np.uint8), residual)
         cloud = self._cloud(frame, self.neutral_mm)
         contact = Contact(self.neutral_mm, 0, 0.0, 0.0)
         quality = self._quality(frame.number, frame, registered, contact, cloud)
-        return RefinedFrame(registered, contact, cloud, quality)
+        return AccurateFrame(registered, contact, cloud, quality)
 
     def _cloud(self, frame: Frame, vertices_mm: np.ndarray) -> Cloud:
         return frame_cloud(self.images, frame, vertices_mm, self.model, self.stereo, self.settings)
@@ -292,9 +292,9 @@ class Refiner:
         near = planes.weights > 0
         return float(np.median(np.abs(planes.heights_mm[near]))) if near.any() else np.nan
 
-    def _failed(self, number: int, start_mm: np.ndarray, reason: str) -> RefinedFrame:
+    def _failed(self, number: int, start_mm: np.ndarray, reason: str) -> AccurateFrame:
         start = np.asarray(start_mm, dtype=np.float64)
         unknown = np.full(len(start), np.nan)
         registered = Registered(start, np.zeros(len(start), dtype=np.uint8), unknown)
         quality = QualityRow(number, False, reason, {})
-        return RefinedFrame(registered, Contact(start, 0, 0.0, 0.0), Cloud.join([]), quality)
+        return AccurateFrame(registered, Contact(start, 0, 0.0, 0.0), Cloud.join([]), quality)

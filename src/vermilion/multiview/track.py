@@ -15,7 +15,7 @@ from vermilion.imaging.sampling import sample_bilinear
 from vermilion.multiview.anchors import Anchor, LoadFrame, TrackSettings
 from vermilion.multiview.motion import (
     Measurements,
-    Reference,
+    ReferenceFrame,
     SolveSettings,
     see_all,
     solve_motion,
@@ -77,7 +77,7 @@ def join_clips(clips: Sequence[Clip], anchors: Sequence[Anchor]) -> Track:
 
 
 def track_clip(
-    reference: Reference,
+    reference: ReferenceFrame,
     frames: Sequence[int],
     load: LoadFrame,
     first_mm: np.ndarray,
@@ -125,7 +125,7 @@ def _sweep(reference, frames, load, start_mm, matcher, settings):
 
 
 def follow(
-    reference: Reference,
+    reference: ReferenceFrame,
     before: Frame,
     after: Frame,
     vertices_mm: np.ndarray,

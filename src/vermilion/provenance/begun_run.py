@@ -22,7 +22,7 @@ from vermilion.storage.files import sha256_of, write_text
 from vermilion.storage.json_files import load_json
 from vermilion.storage.logfile import log_to
 
-#: Environment variable with the path of the file that `record` writes; jobs inherit it.
+#: Environment variable with the path of the file that `record_beginning` writes; jobs inherit it.
 VARIABLE = "VERMILION_RUN"
 #: What was written for runs that began longer ago is removed.
 _KEPT_DAYS = 60
@@ -47,7 +47,7 @@ class BegunRun:
     stamp: str
 
 
-def record(folder: Path, begun: BegunRun) -> Path:
+def record_beginning(folder: Path, begun: BegunRun) -> Path:
     """Write the beginning of a run for its jobs, and set their environment variable.
 
     Args:

@@ -42,7 +42,7 @@ class Damage:
     output: Path
 
 
-def record(
+def update_ledger(
     results: Path, jobs: dict[Path, Path], finished_at: Callable[[Path], float | None]
 ) -> list[Damage]:
     """Bring the ledger up to date after a run; returns what must not be trusted.

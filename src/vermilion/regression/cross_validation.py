@@ -70,7 +70,7 @@ class Curve:
         return {"alpha": float(self.alphas[column]), **beta}
 
 
-def clips_of(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
+def clips_of_rows(sequences: np.ndarray, clip_frames: int, n_folds: int) -> np.ndarray:
     """Clip label of each row: contiguous stretches of a sequence, (F,) int.
 
     Frames are in order of time within one of the `sequences` (F,). Clips are shorter than `clip_frames`

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import linalg
 
 from vermilion.regression.ridge import person_averages, ridge_weights
-from vermilion.regression.scaling import feature_range, feature_scale, trust
+from vermilion.regression.scaling import feature_range, feature_scale, prediction_trust
 
 if TYPE_CHECKING:
     from sklearn.utils import Tags
@@ -184,7 +184,7 @@ class LinearOutputs:
         scaled = self.scaled(features)
         held = np.clip(scaled, self.feature_low_, self.feature_high_)
         added = self._design(held) - self.mean_activation_
-        return self.mean_activation_ + trust(scaled, held, self.fade) * added
+        return self.mean_activation_ + prediction_trust(scaled, held, self.fade) * added
 
     def mixture(self, features: np.ndarray) -> np.ndarray:
         """Coefficients (F, R) of the basis for `features` (F, M), in its precision."""

@@ -54,7 +54,7 @@ def feature_range(scaled: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndar
     return low - reach * (high - low), high + reach * (high - low)
 
 
-def trust(scaled: np.ndarray, held: np.ndarray, fade: float) -> np.ndarray:
+def prediction_trust(scaled: np.ndarray, held: np.ndarray, fade: float) -> np.ndarray:
     """How much a prediction counts whose features `scaled` were `held` within reach, both (F, M): (F, 1).
 
     1 / (1 + (d / fade)^2) of the distance d by which they were held, in units where the training

@@ -13,7 +13,7 @@ from vermilion.config.regressors import GENERIC, VARIANTS, Estimator, split_name
 from vermilion.regression.cross_validation import (
     Curve,
     Rule,
-    clips_of,
+    clips_of_rows,
     cross_validate,
     held_out_novelty,
     target_gram,
@@ -133,7 +133,7 @@ def train(
     features = data.features.astype(np.float64)
     features = (features - shifts[data.persons] if len(shifts) else features)[:, columns]
     persons = data.persons if selection.bias == "person" else None
-    clips = clips_of(data.sequences, selection.clip_frames, selection.folds)
+    clips = clips_of_rows(data.sequences, selection.clip_frames, selection.folds)
     # These are for unseen subjects, so their folds hold out whole people.
     by_person = group in ("GR", GENERIC) and len(np.unique(data.persons)) >= LEAST_PEOPLE
     estimator = selection.estimator(kind, kinds if selection.scaling == "group" else None)

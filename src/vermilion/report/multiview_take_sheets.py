@@ -12,10 +12,10 @@ from vermilion.faces.model import FaceModel
 from vermilion.multiview.drift import (
     Carried,
     DriftSettings,
-    Origin,
+    NeutralImages,
     carry,
     drift_rows,
-    neighbours,
+    neighbouring_cameras,
 )
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.stereo import StereoSettings
@@ -49,15 +49,15 @@ class TakeSheets:
         return self.images.load(self.neutral_frame)
 
     @cached_property
-    def _origin(self) -> Origin:
+    def _origin(self) -> NeutralImages:
         frame = self.images.at(self._neutral, self.drift.scale)
-        return Origin.of(frame, self.neutral_mm, self.model)
+        return NeutralImages.of(frame, self.neutral_mm, self.model)
 
     @cached_property
     def _across(self) -> dict[str, Carried]:
         """The neutral's images, each carried to the neighbouring camera."""
         frame = self._origin.frame
-        sources = neighbours(frame, self.neutral_mm.mean(axis=0))
+        sources = neighbouring_cameras(frame, self.neutral_mm.mean(axis=0))
         return carry(self._origin, frame, self.neutral_mm, self.matcher, self.drift, sources)
 
     def across_rows(self) -> pd.DataFrame:

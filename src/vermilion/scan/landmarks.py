@@ -76,7 +76,7 @@ def find_landmarks(
     )
 
 
-def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmarks:
+def read_scan_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmarks:
     """Landmarks given by hand: a table with the columns landmark (0 to 65), x, y, z.
 
     Raises InputError where there are fewer than six, or numbers that are no landmarks.
@@ -106,8 +106,8 @@ def read_landmarks(path: str | Path, subject: str | None = None) -> ScanLandmark
     return ScanLandmarks(points, np.zeros(N_LANDMARKS))
 
 
-def write_landmarks(path: str | Path, landmarks: ScanLandmarks) -> None:
-    """Write what `read_landmarks` reads, so that found landmarks can be corrected by hand."""
+def write_scan_landmarks(path: str | Path, landmarks: ScanLandmarks) -> None:
+    """Write what `read_scan_landmarks` reads, so that found landmarks can be corrected by hand."""
     numbers = np.flatnonzero(landmarks.known)
     x, y, z = landmarks.points[numbers].T
     write_table(path, pd.DataFrame({"landmark": numbers, "x": x, "y": y, "z": z}))

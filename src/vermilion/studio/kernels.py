@@ -1,6 +1,6 @@
 """Per-pixel colour, compiled: the solid texture and the shading of ray hits.
 
-All functions that `shade` calls stay in this file: numba's cache does not see changes elsewhere.
+All functions that `shade_hits` calls stay in this file: numba's cache does not see changes elsewhere.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def _eye_albedo(out, volume, look, p):
 
 
 @njit(cache=True, fastmath=True, nogil=True)
-def shade(
+def shade_hits(
     out,
     triangle,
     bary,

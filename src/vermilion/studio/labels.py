@@ -15,7 +15,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.polylines import lengths_along, points_at
 from vermilion.geometry.raycast import RayCaster, interpolate
 from vermilion.storage.files import write_text
-from vermilion.studio.surface import SKIN, Surface
+from vermilion.studio.surface import SKIN, StudioSurface
 
 #: Surface further past the meeting line than this is the inside of the mouth, not the lip (mm).
 LIP_DEPTH_MM = 4.0
@@ -47,7 +47,7 @@ class MouthView:
 
 
 def view_mouth(
-    model: FaceModel, surface: Surface, vertices_mm: np.ndarray, camera: Camera
+    model: FaceModel, surface: StudioSurface, vertices_mm: np.ndarray, camera: Camera
 ) -> MouthView:
     """Cast a fine grid of rays round the lips of a head at `vertices_mm` (V, 3), world."""
     border = camera.project(vertices_mm[model.outer_contour])
@@ -66,7 +66,7 @@ def view_mouth(
 
 
 def lip_contours(
-    model: FaceModel, surface: Surface, vertices_mm: np.ndarray, camera: Camera
+    model: FaceModel, surface: StudioSurface, vertices_mm: np.ndarray, camera: Camera
 ) -> dict[str, np.ndarray]:
     """The lip contours that a camera sees, as closed polylines in pixels.
 

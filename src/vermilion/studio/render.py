@@ -13,7 +13,7 @@ from vermilion.geometry.raycast import Hits, RayCaster
 from vermilion.studio import kernels
 from vermilion.studio.lighting import Lighting, bake_light, light_directions
 from vermilion.studio.look import Look, noise_volume
-from vermilion.studio.surface import Surface
+from vermilion.studio.surface import StudioSurface
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Scene:
     """
 
     triangles: np.ndarray
-    surface: Surface
+    surface: StudioSurface
     look: Look
     lighting: Lighting
     occlusion_directions: int = 192
@@ -105,7 +105,7 @@ def _image(scene: Scene, view: _View, normals: np.ndarray, light) -> np.ndarray:
 def _shaded(scene: Scene, directions, hits: Hits, normals, light, pixel_angle) -> np.ndarray:
     surface, shape = scene.surface, hits.triangle.shape
     out = np.empty((hits.triangle.size, 3), dtype=np.float32)
-    kernels.shade(
+    kernels.shade_hits(
         out,
         hits.triangle.reshape(-1),
         hits.barycentric.reshape(-1, 3),

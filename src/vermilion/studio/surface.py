@@ -24,7 +24,7 @@ BORDER_SMOOTHING_MM = 1.2
 
 
 @dataclass(frozen=True)
-class Surface:
+class StudioSurface:
     """Coordinates of the solid texture, one per vertex of the studio model.
 
     Attributes:
@@ -46,7 +46,7 @@ class Surface:
     chin_mm: float
 
 
-def surface_of(model: FaceModel) -> Surface:
+def surface_of(model: FaceModel) -> StudioSurface:
     """Texture coordinates of a studio model; a few seconds at most, once a take."""
     skin, label = _skin_part(model)
     graph = edge_graph(model.neutral_mm, skin)
@@ -54,7 +54,7 @@ def surface_of(model: FaceModel) -> Surface:
     inside = _inside_distance(model, skin, graph)
     upper = upper_side(graph, model.outer_contour, model.inner_contour, model.landmarks)
     brows = model.neutral_mm[model.landmarks[17:27], :2].reshape(2, 5, 2)
-    return Surface(
+    return StudioSurface(
         solid_mm=_solid(model).astype(np.float32),
         lip_mm=lip.astype(np.float32),
         inside_mm=inside.astype(np.float32),

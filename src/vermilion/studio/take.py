@@ -23,7 +23,7 @@ from vermilion.studio.performance import (
     random_poses,
     start_at_neutral,
 )
-from vermilion.studio.surface import Surface
+from vermilion.studio.surface import StudioSurface
 from vermilion.studio.take_settings import TakeSettings
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class StudioTakePlan:
         """Light of the index-th frame."""
         return LIGHTINGS[self.lighting[index]]
 
-    def scene(self, index: int, surface: Surface, **rays: int) -> Scene:
+    def scene(self, index: int, surface: StudioSurface, **rays: int) -> Scene:
         """What the renderer needs of the index-th frame."""
         from vermilion.studio.render import Scene
 

@@ -7,7 +7,12 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
 from vermilion.provenance.begun_run import begin_job
-from vermilion.scan.landmarks import ScanLandmarks, find_landmarks, read_landmarks, write_landmarks
+from vermilion.scan.landmarks import (
+    ScanLandmarks,
+    find_landmarks,
+    read_scan_landmarks,
+    write_scan_landmarks,
+)
 
 
 def landmarks_of(snakemake, generic, head, subject):
@@ -17,7 +22,7 @@ def landmarks_of(snakemake, generic, head, subject):
         places = head.vertices[generic.landmarks]
         return ScanLandmarks(places, 0.0 * places[:, 0])
     if given:
-        return read_landmarks(given, subject)
+        return read_scan_landmarks(given, subject)
     detector = open_detector(
         cfg["landmarks.detector"], snakemake.params.model, cfg["landmarks.networks"]
     )
@@ -29,7 +34,7 @@ def main(snakemake):
     subject = snakemake.wildcards.subject
     generic, head = FaceModel.load(inputs.tracker), read_head(inputs.head, subject)
     landmarks = landmarks_of(snakemake, generic, head, subject)
-    write_landmarks(output.landmarks, landmarks)
+    write_scan_landmarks(output.landmarks, landmarks)
     binding = bind_head(
         generic, head, landmarks,
         least_opening=-cfg["face_model.template_slight_open"], subject=subject, path=inputs.head,

@@ -7,7 +7,7 @@ from vermilion.contours.labelled_frames import offset_rows, read_labelled
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
-from vermilion.contours.training import TrainingSettings, train_detector
+from vermilion.contours.training import ContourTrainingSettings, train_detector
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
@@ -79,7 +79,7 @@ def main(snakemake) -> None:
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)
     if labelled:
-        detector = train_detector(labelled, TrainingSettings.of(cfg), cfg.seed)
+        detector = train_detector(labelled, ContourTrainingSettings.of(cfg), cfg.seed)
     else:
         reach, shade = (cfg.lips_reach, cfg.lips_shade) if dense else (cfg.ridge_reach, 0.0)
         detector = by_track or LandmarkRidgeDetector.of(cfg, reach, lips_shade=shade)

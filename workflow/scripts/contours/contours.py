@@ -2,7 +2,7 @@
 
 from vermilion.config.contours import ContourMapsConfig
 from vermilion.contours.detector_file import load_detector
-from vermilion.contours.labels import label_paths, read_label
+from vermilion.contours.labels import label_paths, read_contour_label
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.maps import frame_maps, maps_overlay, write_maps
 from vermilion.faces.model import FaceModel
@@ -55,7 +55,7 @@ def main(snakemake) -> None:
                 continue
             write_maps(folder / f"{frame:06d}.exr", *maps)
             if frame in shown or frame in labels:
-                drawn = read_label(labels[frame]) if frame in labels else None
+                drawn = read_contour_label(labels[frame]) if frame in labels else None
                 images.append(maps_overlay(image, maps, points, frame, drawn))
     write_quality(snakemake.output.quality, subject, take, "contours", rows)
     write_srgb8(snakemake.output.overlay, sheet(images))

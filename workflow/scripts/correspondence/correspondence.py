@@ -4,7 +4,7 @@ import numpy as np
 
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correspondence.correspondence import CorrespondenceSettings
-from vermilion.correspondence.neutral import Neutral, correspond_neutrals, quality_of
+from vermilion.correspondence.neutral import NeutralFrame, correspond_neutrals, quality_of
 from vermilion.correspondence.overlay import correspondence_overlay
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
@@ -28,7 +28,7 @@ def main(snakemake):
     accurate = Mesh(accurate, template.triangles)
     coarse = Mesh(read_sequence(inputs.coarse)[0].astype(np.float64), tracker.triangles)
     fit, track = TrackedTake.load(inputs.fit), LandmarkTrack.load(inputs.landmarks)
-    neutral = Neutral.of(coarse, accurate, fit, track, **place)
+    neutral = NeutralFrame.of(coarse, accurate, fit, track, **place)
     options = CorrespondenceConfig(**snakemake.params.cfg["correspondence"])
     settings = CorrespondenceSettings(**options.model_dump(exclude={"landmarks"}))
     found, registered, landmarks = correspond_neutrals(

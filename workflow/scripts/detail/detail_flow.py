@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from vermilion.detail.flow.chunk import correct_frames, neighbours
+from vermilion.detail.flow.chunk import correct_frames, neighbouring_frames
 from vermilion.detail.flow.deformation import DeformationSettings
 from vermilion.detail.flow.frame import FlowCorrection, FlowCorrectionSettings
 from vermilion.detail.flow.overlay import checkerboard_sheet
@@ -56,7 +56,7 @@ def main(snakemake):
     chunk = correct_frames(
         correction_of,
         params.frames,
-        lambda frame: neighbours(frame, fit.frames, fit.valid, fit.pieces),
+        lambda frame: neighbouring_frames(frame, fit.frames, fit.valid, fit.pieces),
         read_image,
         read_mesh,
     )

@@ -8,7 +8,7 @@ from vermilion.geometry.mesh_files import read_mesh
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
 from vermilion.provenance.begun_run import begin_job
-from vermilion.scan.landmarks import find_landmarks, read_landmarks, write_landmarks
+from vermilion.scan.landmarks import find_landmarks, read_scan_landmarks, write_scan_landmarks
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.errors import InputError
 
@@ -24,7 +24,7 @@ def neutral_of(inputs, frame, place):
 def landmarks_of(snakemake, generic, mesh, given, place):
     """Landmarks on the neutral: given by hand, or detected in rendered views."""
     if given:
-        return read_landmarks(given, place["subject"])
+        return read_scan_landmarks(given, place["subject"])
     cfg = snakemake.params.cfg
     detector = open_detector(
         cfg["landmarks.detector"], snakemake.params.model, cfg["landmarks.networks"]
@@ -41,7 +41,7 @@ def main(snakemake):
     place = {**snakemake.params.take, "frame": frame}
     generic, mesh = FaceModel.load(inputs.tracker), neutral_of(inputs, frame, place)
     landmarks = landmarks_of(snakemake, generic, mesh, inputs.get("landmarks"), place)
-    write_landmarks(output.landmarks, landmarks)
+    write_scan_landmarks(output.landmarks, landmarks)
     found = label_topology(
         generic, mesh, landmarks, least_opening=-cfg["face_model.template_slight_open"], **place
     )

@@ -10,12 +10,12 @@ from vermilion.external.origin import Origin
 from vermilion.external.placement import Placement
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
-from vermilion.guided.inputs import read_sculpt, read_views, sketch_cameras
+from vermilion.guided.inputs import read_sculpt, read_sketch_views, sketch_cameras
 from vermilion.guided.overlay import draw_refinement
 from vermilion.guided.refined_frame import RefinedFrame
 from vermilion.guided.refinement import RefinementSettings, SketchRefiner
 from vermilion.guided.regions import regions_of_face
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.imaging.draw import tile, to_display
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
@@ -78,7 +78,7 @@ def main(snakemake):
     cfg, frame = snakemake.params.cfg, int(snakemake.wildcards.frame)
     face = FaceModel.load(snakemake.input.face)
     regions = regions_of_face(face, **RegionsConfig(**cfg["guided.regions"]).model_dump())
-    surface = LipSurface.of_face(face, regions)
+    surface = ContourSurface.of_face(face, regions)
     cameras, tracked = cameras_of(snakemake)
     base = read_frames([snakemake.input.sequence], [frame])[0].astype(np.float64)
     files = [Path(path) for path in snakemake.input.corrections]
@@ -91,7 +91,7 @@ def main(snakemake):
         refiner = SketchRefiner(
             regions, surface, crossings=crossings, settings=RefinementSettings(**settings)
         )
-        views = read_views(files, cameras, frame)
+        views = read_sketch_views(files, cameras, frame)
         refined = refiner.refine(base, views)
         corrected, row = refined.vertices_mm, quality_row(frame, refined)
     print(f"frame {frame}: {snakemake.params.kind} {row.figures or ''}")

@@ -9,7 +9,7 @@ from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import read_texture, write_texture
 from vermilion.inpaint.overlay import texture_sheet
 from vermilion.inpaint.tattoo import feather_mask, tattoo_mask
-from vermilion.inpaint.views import read_views
+from vermilion.inpaint.views import read_camera_images
 from vermilion.multiview.files import read_neutral
 from vermilion.provenance.begun_run import begin_job
 
@@ -22,7 +22,9 @@ def main(snakemake):
     domain = lip_domain(model, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
     plain, _ = read_texture(snakemake.input.plain, domain, **place)
     params, frontal = snakemake.params, snakemake.params.cfg["capture.frontal_camera"]
-    views = read_views(params.source, snakemake.input.cameras, frontal, params.neutral, **place)
+    views = read_camera_images(
+        params.source, snakemake.input.cameras, frontal, params.neutral, **place
+    )
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
     caster = RayCaster(neutral, model.triangles)
     seen = view_texels(domain, caster, neutral, views, cfg.edge_mm)

@@ -8,7 +8,7 @@ from vermilion.inpaint.bake import bake
 from vermilion.inpaint.domain import lip_domain
 from vermilion.inpaint.files import write_texture
 from vermilion.inpaint.overlay import texture_sheet
-from vermilion.inpaint.views import read_views
+from vermilion.inpaint.views import read_camera_images
 from vermilion.multiview.files import read_neutral
 from vermilion.provenance.begun_run import begin_job
 
@@ -19,7 +19,9 @@ def main(snakemake):
     model = FaceModel.load(snakemake.input.template)
     domain = lip_domain(model, cfg.skin_mm, cfg.inner_mm, cfg.texel_mm)
     params, frontal = snakemake.params, snakemake.params.cfg["capture.frontal_camera"]
-    views = read_views(params.source, snakemake.input.cameras, frontal, params.neutral, **place)
+    views = read_camera_images(
+        params.source, snakemake.input.cameras, frontal, params.neutral, **place
+    )
     neutral = read_neutral(snakemake.input.neutral, model.n_vertices, **place)
     caster = RayCaster(neutral, model.triangles)
     texture = bake(domain, caster, neutral, views, cfg.edge_mm)

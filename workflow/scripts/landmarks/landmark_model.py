@@ -5,12 +5,12 @@ from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detect import draw_landmarks
 from vermilion.landmarks.labels import read_labels
-from vermilion.landmarks.training import TrainingSettings, labelled_images, train_descent
+from vermilion.landmarks.training import LandmarkTrainingSettings, labelled_images, train_descent
 from vermilion.provenance.begun_run import begin_job
 
 
 def main(snakemake):
-    settings = TrainingSettings(**snakemake.params.cfg["landmarks.training"])
+    settings = LandmarkTrainingSettings(**snakemake.params.cfg["landmarks.training"])
     labels, sources = [], {}
     for take in snakemake.params.takes:
         name = (take["subject"], take["take"])

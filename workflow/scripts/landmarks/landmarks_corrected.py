@@ -2,7 +2,7 @@
 
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
-from vermilion.landmarks.correction import CorrectionSettings, correct
+from vermilion.landmarks.correction import LandmarkCorrectionSettings, correct_landmarks
 from vermilion.landmarks.correction_overlay import correction_overlay
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
@@ -17,12 +17,12 @@ def main(snakemake):
     source = open_frames(snakemake.params.source, subject, take)
     detected = LandmarkTrack.load(list(snakemake.input.landmarks))
     keys = KeyFrames.load(snakemake.input.key_frames)
-    track, rows = correct(
+    track, rows = correct_landmarks(
         lambda frame: grey_of(source.read(camera, frame)),
         detected,
         keys,
         snakemake.params.frames,
-        CorrectionSettings.of(snakemake.params.cfg["landmarks.correction"]),
+        LandmarkCorrectionSettings.of(snakemake.params.cfg["landmarks.correction"]),
     )
     write_srgb8(snakemake.output.overlay, correction_overlay(source, camera, detected, track, keys))
     write_quality(snakemake.output.quality, subject, take, "landmarks", rows)

@@ -1,7 +1,7 @@
 """The cuts of a take, and the face that is followed through it."""
 
 from vermilion.landmarks.faces import SeenFaces
-from vermilion.landmarks.following import FaceChoice, follow
+from vermilion.landmarks.following import FaceChoice, follow_face
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.tables import write_table
 
@@ -9,7 +9,7 @@ from vermilion.storage.tables import write_table
 def main(snakemake):
     params, following = snakemake.params, snakemake.params.cfg["landmarks.following"]
     choice = FaceChoice.of(params.face, following["least_eyes_px"], following["person_difference"])
-    followed = follow(SeenFaces.load(snakemake.input.faces), choice, params.one_shot)
+    followed = follow_face(SeenFaces.load(snakemake.input.faces), choice, params.one_shot)
     for sentence in followed.sentences():
         print(sentence)
     write_table(snakemake.output.table, followed.table())

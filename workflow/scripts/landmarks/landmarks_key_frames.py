@@ -1,8 +1,8 @@
 """Key frames of a take: given ones, and those chosen by local binary patterns, settled by flow."""
 
 from vermilion.imaging.frames import open_frames
-from vermilion.landmarks.correct_key_frames import settle
-from vermilion.landmarks.correction import CorrectionSettings
+from vermilion.landmarks.correct_key_frames import correct_key_frames
+from vermilion.landmarks.correction import LandmarkCorrectionSettings
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.gradients import grey_of
 from vermilion.landmarks.key_frames import KeyFrameSettings, find_key_frames, without_offset
@@ -38,7 +38,7 @@ def main(snakemake):
         read_grey, track, given, settings=KeyFrameSettings(cfg["share"], cfg["max_clip"])
     )
     correction = snakemake.params.cfg["landmarks.correction"]
-    keys = settle(read_grey, track, keys, CorrectionSettings.of(correction))
+    keys = correct_key_frames(read_grey, track, keys, LandmarkCorrectionSettings.of(correction))
     print(f"{len(keys.frames)} key frames of {len(track.frames)} frames")
     write_table(snakemake.output.table, keys.table())
     keys.save(snakemake.output.key_frames)

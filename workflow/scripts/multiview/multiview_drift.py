@@ -3,7 +3,7 @@
 import cv2
 
 from vermilion.faces.model import FaceModel
-from vermilion.multiview.drift import DriftSettings, Origin, carry, drift_rows, unread_row
+from vermilion.multiview.drift import DriftSettings, NeutralImages, carry, drift_rows, unread_row
 from vermilion.multiview.files import read_neutral
 from vermilion.multiview.photometric import FlowMatcher
 from vermilion.multiview.take import MultiviewImages
@@ -24,7 +24,7 @@ def main(snakemake):
         snakemake.params.source, inputs.cameras, cfg["multiview.images"], **place
     )
     neutral = read_neutral(inputs.neutral, model.n_vertices, **place)
-    origin = Origin.of(images.load(snakemake.params.neutral, settings.scale), neutral, model)
+    origin = NeutralImages.of(images.load(snakemake.params.neutral, settings.scale), neutral, model)
     meshes, matcher, rows = read_sequence(inputs.meshes), FlowMatcher(), []
     for number, mesh in progress(zip(frames, meshes, strict=True), "drift", len(frames)):
         try:

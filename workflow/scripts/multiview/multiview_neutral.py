@@ -8,7 +8,7 @@ from vermilion.geometry.mesh import unique_edges
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.imaging.images import write_srgb8
 from vermilion.multiview.cloud import write_cloud
-from vermilion.multiview.files import read_neutral, read_views, write_neutral
+from vermilion.multiview.files import read_landmark_views, read_neutral, write_neutral
 from vermilion.multiview.neutral import NeutralSettings, register_neutral
 from vermilion.multiview.overlay import neutral_sheet
 from vermilion.multiview.photometric import FlowMatcher
@@ -43,7 +43,7 @@ def main(snakemake):
         snakemake.params.source, inputs.cameras, cfg["multiview.images"], subject, take
     )
     frame = images.load(snakemake.params.frame)
-    names, points, confidence = read_views(inputs.landmarks, frame.views)
+    names, points, confidence = read_landmark_views(inputs.landmarks, frame.views)
     landmarks = triangulate_landmarks(
         images.cameras,
         names,

@@ -5,7 +5,7 @@ from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.choose import open_detector
 from vermilion.provenance.begun_run import begin_job
-from vermilion.scan.landmarks import find_landmarks, read_landmarks, write_landmarks
+from vermilion.scan.landmarks import find_landmarks, read_scan_landmarks, write_scan_landmarks
 from vermilion.scan.overlay import scan_overlay
 from vermilion.scan.personal import personal_model
 from vermilion.scan.read import read_scan
@@ -17,13 +17,13 @@ def main(snakemake):
     subject, options = snakemake.wildcards.subject, ScanConfig(**cfg["scan"])
     generic, scan = FaceModel.load(inputs.tracker), read_scan(inputs.scan, subject)
     if options.landmarks:
-        landmarks = read_landmarks(inputs.landmarks, subject)
+        landmarks = read_scan_landmarks(inputs.landmarks, subject)
     else:
         detector = open_detector(
             cfg["landmarks.detector"], snakemake.params.model, cfg["landmarks.networks"]
         )
         landmarks = find_landmarks(scan, detector, generic.neutral_mm[generic.landmarks], subject)
-    write_landmarks(output.landmarks, landmarks)
+    write_scan_landmarks(output.landmarks, landmarks)
     made = personal_model(
         generic,
         scan,

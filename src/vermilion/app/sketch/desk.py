@@ -16,7 +16,7 @@ from vermilion.app.sketch.take_data import TakeData
 from vermilion.app.sketch.take_files import TakeFiles
 from vermilion.app.sketch.take_status import TakeStatus
 from vermilion.guided.magnet import snap_to_contour
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.guided.sketch import CURVE_NAMES, KINDS, MOST_POINTS, sketch_of_json
 
 LAYERS = ("base", "refined", "propagated")
@@ -34,7 +34,7 @@ class Desk:
         self.data = data = TakeData(files)
         sizes = {name: (c.width_px, c.height_px) for name, c in data.cameras.items()}
         self.store = SketchStore(files.labels, sizes, data.frames)
-        surface = LipSurface.of_face(data.face, data.regions)
+        surface = ContourSurface.of_face(data.face, data.regions)
         self._lines = LipLines(data.face, surface)
         self.solver = FrameSolver(data, surface, self.store)
         self.views = FrameViews(data, self._lines)

@@ -15,7 +15,7 @@ from vermilion.app.sketch.take_data import TakeData
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.guided.refined_frame import RefinedFrame
 from vermilion.guided.refinement import Refined, RefinementSettings, SketchRefiner
-from vermilion.guided.silhouette import LipSurface
+from vermilion.guided.silhouette import ContourSurface
 from vermilion.storage.errors import VermilionError
 
 #: A contour that stays further off its stroke in the mean did not converge; its ends often stay off.
@@ -40,7 +40,7 @@ class Solved:
 class FrameSolver:
     """Refines frames of one take, one at a time; factors once."""
 
-    def __init__(self, data: TakeData, surface: LipSurface, store: SketchStore):
+    def __init__(self, data: TakeData, surface: ContourSurface, store: SketchStore):
         self._data, self._surface, self._store = data, surface, store
         self._lock = threading.Lock()
         self._refiner: SketchRefiner | None = None

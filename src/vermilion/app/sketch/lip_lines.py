@@ -8,8 +8,8 @@ from vermilion.faces.contours import contour_halves
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import Camera
 from vermilion.guided.curves import first_self_crossing, mouth_axes
-from vermilion.guided.refinement import RefinementSettings, View
-from vermilion.guided.silhouette import LipSurface, Segments, inner_silhouettes, outer_contours
+from vermilion.guided.refinement import RefinementSettings, SketchView
+from vermilion.guided.silhouette import ContourSurface, Segments, inner_silhouettes, outer_contours
 from vermilion.guided.sketch import CURVE_NAMES, Sketch
 
 #: A line of the mesh further from its silhouette than this share of the mouth is not its contour.
@@ -19,7 +19,7 @@ _NEAR_SHARE = 0.15
 class LipLines:
     """Finds the four contours of a topology's meshes in cameras."""
 
-    def __init__(self, face: FaceModel, surface: LipSurface):
+    def __init__(self, face: FaceModel, surface: ContourSurface):
         self._surface = surface
         self._lines: dict[str, np.ndarray] = {}
         for part, loop in (("inner", face.inner_contour), ("outer", face.outer_contour)):
@@ -58,7 +58,7 @@ class LipLines:
 
     def off_px(self, sketch: Sketch, vertices_mm: np.ndarray, camera: Camera) -> float:
         """Mean distance of the strokes of a sketch from the contours of a mesh vertices_mm (V, 3), world."""
-        view = View.of(sketch, camera, RefinementSettings())
+        view = SketchView.of(sketch, camera, RefinementSettings())
         found = view.contours(vertices_mm, self._surface)
         return float(
             np.concatenate([found[name].nearest(view.samples[name])[1] for name in found]).mean()

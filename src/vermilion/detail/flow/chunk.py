@@ -57,7 +57,7 @@ def correct_frames(
         correction_of: frame -> correction of its piece of the take, or InputError where it was not tracked.
         frames: numbers of the frames.
         near: frame -> itself, the next and the one before; itself in place of one that is not there
-            (`neighbours`).
+            (`neighbouring_frames`).
         read_image: frame -> image (h, w, 3), linear RGB, or InputError.
         read_mesh: frame -> coarse mesh (V, 3) mm, world.
     """
@@ -84,7 +84,9 @@ def correct_frames(
     )
 
 
-def neighbours(frame: int, frames: np.ndarray, valid: np.ndarray, piece: np.ndarray) -> list[int]:
+def neighbouring_frames(
+    frame: int, frames: np.ndarray, valid: np.ndarray, piece: np.ndarray
+) -> list[int]:
     """A frame, the next and the one before; itself in place of one that no image of its shot can be compared with.
 
     Args:
