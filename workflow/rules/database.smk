@@ -12,6 +12,21 @@ def database_takes():
     return found
 
 
+def described(rows):
+    """What a database's script is told of each of some takes."""
+    return [
+        {
+            "subject": take.subject,
+            "take": take.take,
+            "fps": take.fps,
+            "split": take.split,
+            "train": take.train_frames(),
+            "chunks": len(chunks(take)),
+        }
+        for take in rows
+    ]
+
+
 rule database:
     """Gathers features and layers of all subjects in one HDF5, with the split of every frame."""
     input:
@@ -33,17 +48,7 @@ rule database:
         cfg=cfg_of("database"),
         code=code_of("database/database"),
         subjects=lambda wildcards: subjects("tattoo"),
-        takes=lambda wildcards: [
-            {
-                "subject": take.subject,
-                "take": take.take,
-                "fps": take.fps,
-                "split": take.split,
-                "train": take.train_frames(),
-                "chunks": len(chunks(take)),
-            }
-            for take in database_takes()
-        ],
+        takes=lambda wildcards: described(database_takes()),
     script:
         "../scripts/database/database.py"
 
@@ -87,16 +92,6 @@ rule generic_database:
         cfg=cfg_of("database", "correspondence", "correction.layers"),
         code=code_of("database/generic_database"),
         subjects=lambda wildcards: generic_subjects(),
-        takes=lambda wildcards: [
-            {
-                "subject": take.subject,
-                "take": take.take,
-                "fps": take.fps,
-                "split": take.split,
-                "train": take.train_frames(),
-                "chunks": len(chunks(take)),
-            }
-            for take in generic_takes()
-        ],
+        takes=lambda wildcards: described(generic_takes()),
     script:
         "../scripts/database/generic_database.py"

@@ -83,6 +83,11 @@ def takes_that_train():
     return [take for take in takes("tattoo") if take.train_frames()]
 
 
+def error_image(path, caption, subcategory, what=""):
+    """An image of a take's errors that Snakemake's report shows."""
+    return in_report(path, "Errors", caption, subcategory, take="{subject}/{take}" + what)
+
+
 rule lip_shapes:
     """Chooses lip shapes of the training takes for the contour baseline: lip_shapes.npz."""
     input:
@@ -215,20 +220,8 @@ rule guided_evaluate:
         unpack(studied_truth),
     output:
         measures=P.guided_measures,
-        figure=report(
-            P.guided_figure,
-            category="Errors",
-            subcategory="Guided correction",
-            labels={"take": "{subject}/{take}"},
-            caption="../report/figure11.rst",
-        ),
-        sheet=report(
-            P.guided_sheet,
-            category="Errors",
-            subcategory="Guided correction",
-            labels={"take": "{subject}/{take}, maps"},
-            caption="../report/figure12.rst",
-        ),
+        figure=error_image(P.guided_figure, "figure11", "Guided correction"),
+        sheet=error_image(P.guided_sheet, "figure12", "Guided correction", ", maps"),
     log:
         P.log("guided_evaluate", "take"),
     benchmark:
@@ -250,34 +243,10 @@ rule evaluation_figures:
         maps=P.evaluated + "/maps.npz",
         frames=P.evaluated + "/frames.tsv",
     output:
-        maps=in_report(
-            P.evaluated + "/error_maps.png",
-            "Errors",
-            "error_maps",
-            subcategory="Error maps",
-            take="{subject}/{take}",
-        ),
-        renders=in_report(
-            P.evaluated + "/renders.png",
-            "Errors",
-            "renders",
-            subcategory="Renders",
-            take="{subject}/{take}",
-        ),
-        stretch=in_report(
-            P.evaluated + "/stretch.png",
-            "Errors",
-            "stretch",
-            subcategory="Surface stretch",
-            take="{subject}/{take}",
-        ),
-        curves=in_report(
-            P.evaluated + "/curves.png",
-            "Errors",
-            "curves",
-            subcategory="Over time",
-            take="{subject}/{take}",
-        ),
+        maps=error_image(P.evaluated + "/error_maps.png", "error_maps", "Error maps"),
+        renders=error_image(P.evaluated + "/renders.png", "renders", "Renders"),
+        stretch=error_image(P.evaluated + "/stretch.png", "stretch", "Surface stretch"),
+        curves=error_image(P.evaluated + "/curves.png", "curves", "Over time"),
     log:
         P.log("evaluation_figures", "take"),
     benchmark:

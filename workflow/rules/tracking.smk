@@ -6,6 +6,8 @@ outside the model's space; and how much of the image each step explains.
 """
 
 TRACKED_ROLES = ("tattoo", "video")
+#: What every step of the image fit reads, beside its own keys.
+IMAGE_FIT_KEYS = ("tracking.fit", "tracking.motion", "tracking.image_fit.lips")
 
 
 def one_of(names):
@@ -188,9 +190,7 @@ rule appearance:
         runtime=growing(30),
     params:
         cfg=cfg_of(
-            "tracking.fit",
-            "tracking.motion",
-            "tracking.image_fit.lips",
+            *IMAGE_FIT_KEYS,
             "tracking.image_fit.appearance",
             "tracking.image_fit.frame_fit",
         ),
@@ -220,9 +220,7 @@ rule image_fit:
         runtime=growing(60),
     params:
         cfg=cfg_of(
-            "tracking.fit",
-            "tracking.motion",
-            "tracking.image_fit.lips",
+            *IMAGE_FIT_KEYS,
             "tracking.image_fit.appearance",
             "tracking.image_fit.frame_fit",
         ),
@@ -254,12 +252,7 @@ if CONFIG.tracking.image_fit.enabled:
             mem_mb=growing(1000, for_each_frame=2),
             runtime=growing(60),
         params:
-            cfg=cfg_of(
-                "tracking.fit",
-                "tracking.motion",
-                "tracking.image_fit.lips",
-                "tracking.image_fit.join",
-            ),
+            cfg=cfg_of(*IMAGE_FIT_KEYS, "tracking.image_fit.join"),
             code=code_of("tracking/image_fit_join"),
             fps=take_fps,
         script:
@@ -285,13 +278,7 @@ rule offsets:
         mem_mb=growing(1500),
         runtime=growing(60),
     params:
-        cfg=cfg_of(
-            "tracking.fit",
-            "tracking.motion",
-            "tracking.image_fit.lips",
-            "tracking.image_fit.appearance",
-            "tracking.offsets",
-        ),
+        cfg=cfg_of(*IMAGE_FIT_KEYS, "tracking.image_fit.appearance", "tracking.offsets"),
         code=code_of("tracking/offsets"),
         source=chunk_source,
         frames=chunk_frames,
@@ -322,9 +309,7 @@ rule residuals:
         runtime=growing(60),
     params:
         cfg=cfg_of(
-            "tracking.fit",
-            "tracking.motion",
-            "tracking.image_fit.lips",
+            *IMAGE_FIT_KEYS,
             "tracking.image_fit.appearance",
             "tracking.image_fit.overlay_frames",
         ),

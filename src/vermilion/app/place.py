@@ -38,3 +38,9 @@ def enter_project() -> Path:
     folder = project_folder()
     os.chdir(folder)
     return folder
+
+
+def enter_project_with(configuration: str) -> str:
+    """The same; returns the path of a user's configuration as the workflow names it."""
+    path = Path(configuration).absolute()
+    return from_here(path, enter_project())

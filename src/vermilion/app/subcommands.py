@@ -41,6 +41,13 @@ def parser_of(module_name: str, program: str) -> argparse.ArgumentParser:
     return parser
 
 
+def add_configuration(parser: argparse.ArgumentParser) -> None:
+    """The argument of commands that look at a run: its configuration, the demo's by default."""
+    parser.add_argument(
+        "configuration", nargs="?", default="config/config.yaml", help="a YAML file (the demo's)"
+    )
+
+
 def listing(usage: str, found: Mapping[str, str]) -> str:
     """The usage, and a line for each command."""
     width = max(map(len, found), default=0)

@@ -14,7 +14,7 @@ from vermilion.geometry.rotations import exp_about_mean, log_about_mean
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import JAW, interocular_px
 from vermilion.tracking.landmark_fit.start import fill_gaps
-from vermilion.tracking.result import TrackedTake
+from vermilion.tracking.result import TrackedTake, camera_arrays
 
 _TRIM, _ROUNDS = 0.2, 2
 
@@ -106,11 +106,7 @@ def external_take(
         world_from_head_translation_mm=translation,
         valid=there & ~missed,
         reprojection_px=error,
-        camera_name=np.array(camera.name),
-        camera_model=np.array(camera.model),
-        camera_params=np.array(camera.params, dtype=np.float64),
-        camera_size_px=np.array([camera.width_px, camera.height_px]),
-        cam_from_world=np.asarray(camera.cam_from_world, dtype=np.float64),
+        **camera_arrays(camera),
         piece=np.asarray(pieces),
     )
 

@@ -168,11 +168,7 @@ class TrackedTake:
             @ to_world.T,
             valid=np.asarray(valid, dtype=bool),
             reprojection_px=motion.reprojection_px,
-            camera_name=np.array(camera.name),
-            camera_model=np.array(camera.model),
-            camera_params=np.array(camera.params, dtype=np.float64),
-            camera_size_px=np.array([camera.width_px, camera.height_px]),
-            cam_from_world=np.asarray(camera.cam_from_world, dtype=np.float64),
+            **camera_arrays(camera),
             piece=None if piece is None else np.asarray(piece),
         )
 
@@ -233,6 +229,17 @@ class TrackedTake:
         """Read what `save` wrote."""
         piece = read_arrays(path, "TrackedTake of the tracker").get("piece")
         return cls(**_load(path, cls), piece=piece)
+
+
+def camera_arrays(camera: Camera) -> dict[str, np.ndarray]:
+    """The fields of `TrackedTake` that say what its camera is: size (2,), pose (3, 4), ..."""
+    return {
+        "camera_name": np.array(camera.name),
+        "camera_model": np.array(camera.model),
+        "camera_params": np.array(camera.params, dtype=np.float64),
+        "camera_size_px": np.array([camera.width_px, camera.height_px]),
+        "cam_from_world": np.asarray(camera.cam_from_world, dtype=np.float64),
+    }
 
 
 def _names(kind: type) -> list[str]:

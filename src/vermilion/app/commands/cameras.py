@@ -11,22 +11,18 @@ from __future__ import annotations
 
 import argparse
 
+from vermilion.app.subcommands import add_configuration
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The configuration, and one take."""
-    parser.add_argument(
-        "configuration", nargs="?", default="config/config.yaml", help="a YAML file (the demo's)"
-    )
+    add_configuration(parser)
     parser.add_argument("--take", help="only this take, written subject/take")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print and draw in the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.cameras import report
 
-    configuration = Path(arguments.configuration).absolute()
-    place.enter_project()
-    return report(configuration, arguments.take)
+    return report(place.enter_project_with(arguments.configuration), arguments.take)

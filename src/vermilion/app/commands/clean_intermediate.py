@@ -20,12 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Clean in the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.clean_intermediate import clean_intermediate
 
-    configuration = Path(arguments.configuration).absolute()
-    project = place.enter_project()
-    print(clean_intermediate(place.from_here(configuration, project), arguments.dry_run))
+    print(clean_intermediate(place.enter_project_with(arguments.configuration), arguments.dry_run))
     return 0

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 
+from vermilion.app.subcommands import add_configuration
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The configuration, the take, the format and the folder."""
-    parser.add_argument(
-        "configuration", nargs="?", default="config/config.yaml", help="a YAML file (the demo's)"
-    )
+    add_configuration(parser)
     parser.add_argument("--take", help="only this take, written subject/take")
     parser.add_argument("--format", choices=("png", "exr", "mov"), default="png", help="of images")
     parser.add_argument("--out", help="folder to write (<results>/plates)")
@@ -29,7 +29,6 @@ def run(arguments: argparse.Namespace) -> int:
     from vermilion.app import place
     from vermilion.app.plates import write_plates_of
 
-    configuration = Path(arguments.configuration).absolute()
     out = Path(arguments.out).absolute() if arguments.out else None
-    place.enter_project()
-    return write_plates_of(str(configuration), arguments.take, arguments.format, out)
+    configuration = place.enter_project_with(arguments.configuration)
+    return write_plates_of(configuration, arguments.take, arguments.format, out)

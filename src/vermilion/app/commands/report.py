@@ -7,21 +7,17 @@ from __future__ import annotations
 
 import argparse
 
+from vermilion.app.subcommands import add_configuration
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The configuration."""
-    parser.add_argument(
-        "configuration", nargs="?", default="config/config.yaml", help="a YAML file (the demo's)"
-    )
+    add_configuration(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write it from the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.run import main
 
-    configuration = Path(arguments.configuration).absolute()
-    project = place.enter_project()
-    return main(place.from_here(configuration, project), ["--only-report"])
+    return main(place.enter_project_with(arguments.configuration), ["--only-report"])

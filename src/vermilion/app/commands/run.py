@@ -23,11 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run it from the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.run import main
 
-    configuration = Path(arguments.configuration).absolute()
-    project = place.enter_project()
-    return main(place.from_here(configuration, project), arguments.options)
+    return main(place.enter_project_with(arguments.configuration), arguments.options)

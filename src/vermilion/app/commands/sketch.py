@@ -22,11 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page from the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.sketch.__main__ import main
 
-    configuration = Path(arguments.configuration).absolute()
-    project = place.enter_project()
-    return main([place.from_here(configuration, project), arguments.take, *arguments.options])
+    return main(
+        [place.enter_project_with(arguments.configuration), arguments.take, *arguments.options]
+    )

@@ -9,22 +9,19 @@ from __future__ import annotations
 
 import argparse
 
+from vermilion.app.subcommands import add_configuration
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The configuration."""
-    parser.add_argument(
-        "configuration", nargs="?", default="config/config.yaml", help="a YAML file (the demo's)"
-    )
+    add_configuration(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Verify in the project's folder."""
-    from pathlib import Path
-
     from vermilion.app import place
     from vermilion.app.run import results_folder
     from vermilion.provenance.checksums import main
 
-    configuration = Path(arguments.configuration).absolute()
-    place.enter_project()
+    configuration = place.enter_project_with(arguments.configuration)
     return main([str(results_folder(configuration))])
