@@ -9,6 +9,8 @@ import pytest
 from tests import lip_patch
 from vermilion.geometry.raycast import RayCaster
 from vermilion.imaging.draw import to_display
+from vermilion.imaging.images import linear_to_srgb
+from vermilion.inpaint import frame, grain, opening_search
 from vermilion.inpaint.bake import Texture, bake
 from vermilion.inpaint.composite import Layer, Window, composite
 from vermilion.inpaint.domain import lip_domain
@@ -222,6 +224,31 @@ def test_a_painted_frame_looks_as_if_never_tattooed(model, domain, textures, opa
     far = np.ones(where.shape, bool)
     far[painted.window.slices] = False
     assert np.array_equal(painted.linear[far], tattooed[far])
+
+
+def test_a_frame_needs_one_ray_caster_and_converts_nothing_to_srgb_twice(
+    model, domain, textures, opacity, monkeypatch
+):
+    casters, converted = [], []
+    build = RayCaster.__init__
+
+    def counted(self, *mesh):
+        casters.append(mesh)
+        build(self, *mesh)
+
+    def seen(linear):
+        converted.append(np.asarray(linear).tobytes())
+        return linear_to_srgb(linear)
+
+    camera = lip_patch.cameras()["front"]
+    image = lip_patch.render(model, model.neutral_mm, camera, tattoo=True)
+    monkeypatch.setattr(RayCaster, "__init__", counted)
+    for module in (frame, grain, opening_search):
+        monkeypatch.setattr(module, "linear_to_srgb", seen)
+    paint = InpaintInputs(domain, textures[0], textures[2], opacity, ShadingSettings())
+    assert inpaint_frame(paint, image, camera, model.neutral_mm, model.triangles, (0,))
+    assert len(casters) == 1
+    assert len(converted) > 2 and len(set(converted)) == len(converted)
 
 
 def test_lips_outside_the_image_are_left_alone(model, domain, textures, opacity):
