@@ -80,7 +80,7 @@ KINDS = {
     "sheet": (tables.file("takes.tsv", tables.SHEET), tables.sheet),
     "landmarks.csv": (tables.file("a.csv", tables.tracked()), tables.landmarks),
     "curves.csv": (tables.file("a.csv", tables.CURVES), tables.curves),
-    "scan.tsv": (tables.file("a.tsv", tables.SCAN), tables.read_landmarks),
+    "scan.tsv": (tables.file("a.tsv", tables.SCAN), tables.read_scan_landmarks),
     "config.yaml": (configurations.file("capture:\n  frontal_camera: face2\nchunk_frames: 50\n"),
                     configurations.load),
 }  # fmt: skip
