@@ -7,7 +7,7 @@ import pycolmap
 import pytest
 
 from vermilion.geometry.camera import look_at, pinhole, read_cameras, write_cameras
-from vermilion.geometry.colmap import camera_names, model_files
+from vermilion.geometry.colmap import camera_of_images, model_files
 from vermilion.storage.errors import InputError
 
 
@@ -55,14 +55,14 @@ def test_models_with_rigs_and_camera_folders_are_read(tmp_path, binary, points):
 
 
 def test_images_are_named_after_their_camera_or_lie_in_its_folder():
-    assert camera_names(["a.png", "b"]) == {"a.png": "a", "b": "b"}
-    assert camera_names(["f/0001.jpg", "g/0001.jpg"]) == {"f/0001.jpg": "f", "g/0001.jpg": "g"}
-    assert camera_names(["rig/cam1/1.png"]) == {"rig/cam1/1.png": "cam1"}
-    assert camera_names(["images/face0.jpg", "images/face1.jpg"]) == {
+    assert camera_of_images(["a.png", "b"]) == {"a.png": "a", "b": "b"}
+    assert camera_of_images(["f/0001.jpg", "g/0001.jpg"]) == {"f/0001.jpg": "f", "g/0001.jpg": "g"}
+    assert camera_of_images(["rig/cam1/1.png"]) == {"rig/cam1/1.png": "cam1"}
+    assert camera_of_images(["images/face0.jpg", "images/face1.jpg"]) == {
         "images/face0.jpg": "face0",
         "images/face1.jpg": "face1",
     }
-    assert camera_names(["cam.1", "cam.2"]) == {"cam.1": "cam.1", "cam.2": "cam.2"}
+    assert camera_of_images(["cam.1", "cam.2"]) == {"cam.1": "cam.1", "cam.2": "cam.2"}
 
 
 def test_a_camera_of_two_poses_is_named(tmp_path):

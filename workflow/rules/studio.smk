@@ -7,7 +7,7 @@ wants to know the names of outputs beforehand, there is one rule a take and chun
 
 from vermilion.config.studio import StudioSubject, StudioTake
 from vermilion.studio.labels import label_frames
-from vermilion.studio.rig import FRONTAL_PAIR, cameras_of_role
+from vermilion.studio.rig import FRONTAL_PAIR, camera_names
 
 STUDIO_PLAN_KEYS = (
     "identity_spread",
@@ -83,7 +83,7 @@ def studio_contour_labels(take):
     """[camera, frame] of the contours that a person would draw."""
     if take.role == "plain" or studio_performance(take).performance == "people":
         return []
-    camera = FRONTAL_PAIR[0] if take.is_multiview else cameras_of_role(take.role)[0]
+    camera = FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role)[0]
     frames = label_frames(take.first, take.last, CONFIG.studio.contour_labels)
     return [[camera, frame] for frame in frames]
 
@@ -91,7 +91,7 @@ def studio_contour_labels(take):
 def studio_landmark_labels(take):
     """[camera, frame] of the landmarks that a person would mark: the neutral, seen by the frontal
     pair; every frame of a `people` take."""
-    cameras = FRONTAL_PAIR if take.is_multiview else cameras_of_role(take.role)
+    cameras = FRONTAL_PAIR if take.is_multiview else camera_names(take.role)
     people = studio_performance(take).performance == "people"
     frames = take.frames if people else [take.first]
     return [[camera, frame] for camera in cameras for frame in frames]
@@ -132,7 +132,7 @@ def studio_frames(take, chunk):
     folder = fill(P.capture_folder, take) + "/frames"
     return [
         f"{folder}/{camera}/{frame:06d}.png"
-        for camera in cameras_of_role(take_of(take).role)
+        for camera in camera_names(take_of(take).role)
         for frame in frames_in(chunk)
     ]
 

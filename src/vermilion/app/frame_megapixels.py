@@ -11,7 +11,7 @@ from vermilion.imaging.images import AS_TAGGED, ImageReading, image_size
 from vermilion.imaging.source import is_video
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import VermilionError
-from vermilion.studio.rig import FACE_ANGLES_DEG, LIP_ANGLES_DEG, VIDEO_CAMERAS, cameras_of_role
+from vermilion.studio.rig import FACE_ANGLES_DEG, LIP_ANGLES_DEG, VIDEO_CAMERAS, camera_names
 
 
 def frame_megapixels(
@@ -40,7 +40,7 @@ def _studio_sizes(role: str, studio: StudioConfig) -> list[tuple[int, int]]:
         **dict.fromkeys(LIP_ANGLES_DEG, studio.lip_size_px),
         **dict.fromkeys(VIDEO_CAMERAS, studio.video_size_px),
     }
-    return [of_group[name] for name in cameras_of_role(role)]
+    return [of_group[name] for name in camera_names(role)]
 
 
 def _sizes(source: Path, reading: ImageReading) -> list[tuple[int, int]]:

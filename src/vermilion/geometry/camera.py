@@ -9,7 +9,7 @@ import numpy as np
 import pycolmap
 
 from vermilion.geometry.camera_check import check_camera
-from vermilion.geometry.colmap import camera_names, read_colmap_model
+from vermilion.geometry.colmap import camera_of_images, read_colmap_model
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 
@@ -200,7 +200,7 @@ def read_cameras(folder: str | Path) -> dict[str, Camera]:
     model = read_colmap_model(folder)
     images = {image.name: image for image in model.images.values()}
     cameras: dict[str, Camera] = {}
-    for image_name, name in sorted(camera_names(images).items()):
+    for image_name, name in sorted(camera_of_images(images).items()):
         image = images[image_name]
         camera = model.cameras[image.camera_id]
         transform = image.cam_from_world()

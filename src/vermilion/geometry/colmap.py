@@ -113,7 +113,7 @@ def _lacking(folder: Path) -> str:
     return " and ".join(name for name in names if not (folder / name).is_file())
 
 
-def camera_names(images: Iterable[str]) -> dict[str, str]:
+def camera_of_images(images: Iterable[str]) -> dict[str, str]:
     """Camera of each image of a model, by the image's name.
 
     Where every image lies in a folder and is named by a number, as COLMAP's rigs have it

@@ -45,7 +45,7 @@ class RigSettings:
     video_view_mm: float
 
 
-def cameras_of_role(role: str) -> tuple[str, ...]:
+def camera_names(role: str) -> tuple[str, ...]:
     """Cameras of a take of this role."""
     return MULTIVIEW_CAMERAS if role in ("tattoo", "plain") else VIDEO_CAMERAS
 
