@@ -13,6 +13,7 @@ from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.provenance.begun_run import begin_job
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake

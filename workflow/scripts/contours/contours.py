@@ -7,11 +7,13 @@ from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
 from vermilion.contours.maps import frame_maps, maps_overlay, write_maps
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
+from vermilion.imaging.draw import sheet
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.files import atomic_folder
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence

@@ -15,11 +15,13 @@ from vermilion.features.shape_space import shape_space
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.features.vector import FeatureTable, quality_row
 from vermilion.geometry.head_frame import head_from_world
+from vermilion.imaging.draw import sheet
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.errors import InputError
+from vermilion.storage.frames import evenly_taken
 from vermilion.storage.progress import progress
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence
