@@ -26,7 +26,7 @@ rule plain_texture:
     benchmark:
         P.benchmark("plain_texture", "subject")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=320),
         runtime=growing(20),
     params:
         cfg=cfg_of("inpaint.domain", "capture.frontal_camera"),
@@ -54,7 +54,7 @@ rule inpaint_reference:
     benchmark:
         P.benchmark("inpaint_reference", "take")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=300),
         runtime=growing(20),
     params:
         cfg=cfg_of("inpaint.domain", "inpaint.mask", "capture.frontal_camera"),
@@ -83,7 +83,7 @@ rule inpaint:
     benchmark:
         P.benchmark("inpaint", "chunk")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=250),
         runtime=growing(10, for_each_frame=0.1),
     params:
         cfg=cfg_of(

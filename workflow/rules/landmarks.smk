@@ -207,7 +207,7 @@ rule landmarks:
     benchmark:
         P.benchmark("landmarks", "chunk")
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(1000, for_mono=70),
         runtime=growing(30),
     params:
         code=code_of("landmarks/landmarks"),
