@@ -42,7 +42,7 @@ rule contour_detector:
     benchmark:
         P.benchmark("contour_detector", "take")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=210),
         runtime=growing(30),
     params:
         cfg=cfg_of("contours.detector"),
@@ -70,7 +70,7 @@ rule contours:
     benchmark:
         P.benchmark("contours", "chunk")
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(1000, for_mono=60),
         runtime=growing(60),
     params:
         cfg=cfg_of("contours.maps"),

@@ -36,7 +36,7 @@ rule correspondence:
     benchmark:
         P.benchmark("correspondence", "subject")
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(1000, for_mono=330),
         runtime=growing(20),
     params:
         cfg=cfg_of("correspondence"),

@@ -282,7 +282,7 @@ if EXTERNAL:
         wildcard_constraints:
             take=one_of(_TAKES[name].take for name in EXTERNAL),
         resources:
-            mem_mb=growing(1500),
+            mem_mb=growing(1500, for_mono=350),
             runtime=growing(60),
         params:
             cfg=cfg_of("tracking.meshes"),

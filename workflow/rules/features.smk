@@ -21,7 +21,7 @@ rule features:
     benchmark:
         P.benchmark("features", "chunk")
     resources:
-        mem_mb=growing(1000),
+        mem_mb=growing(1000, for_mono=60),
         runtime=growing(30),
     params:
         cfg=cfg_of("features.shape", "features.contours"),

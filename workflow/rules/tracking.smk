@@ -95,7 +95,7 @@ rule image_identity:
     wildcard_constraints:
         subject=one_of(image_identity_subjects()),
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=160),
         runtime=growing(30),
     params:
         cfg=cfg_of("tracking.fit", "tracking.identity"),
@@ -186,7 +186,7 @@ rule appearance:
     benchmark:
         P.benchmark("appearance", "take")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=300),
         runtime=growing(30),
     params:
         cfg=cfg_of(
@@ -216,7 +216,7 @@ rule image_fit:
     benchmark:
         P.benchmark("image_fit", "chunk")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=30),
         runtime=growing(60),
     params:
         cfg=cfg_of(
@@ -305,7 +305,7 @@ rule residuals:
     benchmark:
         P.benchmark("residuals", "chunk")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=110),
         runtime=growing(60),
     params:
         cfg=cfg_of(
@@ -359,7 +359,7 @@ rule tracking_meshes:
     benchmark:
         P.benchmark("tracking_meshes", "chunk")
     resources:
-        mem_mb=growing(1500),
+        mem_mb=growing(1500, for_mono=350),
         runtime=growing(60),
     params:
         cfg=cfg_of("tracking.meshes"),
