@@ -112,8 +112,8 @@ def write_one(folder: Path, kind: str, arguments: argparse.Namespace) -> dict[st
 
     def basis():
         if arguments.topology == "full":
-            return other.basis(shape_basis(coarse, 0.02))
-        return shape_basis(animation, 0.02)
+            return other.basis(shape_basis(coarse, 0.02, folder))
+        return shape_basis(animation, 0.02, folder)
 
     out = folder / kind
     out.mkdir()

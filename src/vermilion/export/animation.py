@@ -39,12 +39,12 @@ class NamedShapes:
 
     Attributes:
         names: K names.
-        shapes_mm: (K, V, 3) displacements at weight 1, head frame.
+        shapes_mm: (K, V, 3) displacements at weight 1, head frame; of a `ShapeBasis` what gives them one by one.
         weights: (F, K).
     """
 
     names: tuple[str, ...]
-    shapes_mm: np.ndarray
+    shapes_mm: Any
     weights: np.ndarray
 
 

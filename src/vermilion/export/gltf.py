@@ -7,9 +7,11 @@ rate and the first frame, and what glTF's cameras cannot hold: the principal poi
 from __future__ import annotations
 
 import json
+import shutil
 import struct
+import tempfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,10 +30,13 @@ _METRES = 0.001
 
 
 class _Buffer:
-    """The binary part of a file, and the accessors that point into it."""
+    """The binary part of a file, and the accessors that point into it.
 
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
+    The part is as large as the file, whose head is known at its end: it is collected in a stream.
+    """
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self.stream = stream
         self.length = 0
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
@@ -42,7 +47,7 @@ class _Buffer:
         if target is not None:
             view["target"] = target
         padded = data + b"\0" * (-len(data) % 4)
-        self.parts.append(padded)
+        self.stream.write(padded)
         self.length += len(padded)
         self.views.append(view)
         return len(self.views) - 1
@@ -76,7 +81,18 @@ def write_gltf(
         basis: its blend shapes.
         texture: PNG of the albedo.
     """
-    buffer = _Buffer()
+    with (
+        atomic_path(path) as temporary,
+        tempfile.TemporaryFile(dir=temporary.parent) as collected,
+    ):
+        buffer = _Buffer(collected)
+        _write(temporary, _document(buffer, animation, basis, texture), buffer)
+
+
+def _document(
+    buffer: _Buffer, animation: Animation, basis: ShapeBasis, texture: bytes | None
+) -> dict[str, Any]:
+    """The head of the file; the buffer takes the rest."""
     children = [{"name": "head", "mesh": 0}]
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "Vermilion", "extras": _facts(animation)},
@@ -102,19 +118,19 @@ def write_gltf(
     document["nodes"] = [root, *children]
     document |= {"accessors": buffer.accessors, "bufferViews": buffer.views}
     document["buffers"] = [{"byteLength": buffer.length}]
-    _write(path, document, buffer)
+    return document
 
 
-def _write(path: str | Path, document: dict[str, Any], buffer: _Buffer) -> None:
+def _write(path: Path, document: dict[str, Any], buffer: _Buffer) -> None:
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     total = 12 + 8 + len(text) + 8 + buffer.length
-    with atomic_path(path) as temporary, open(temporary, "wb") as stream:
+    with path.open("wb") as stream:
         stream.write(struct.pack("<4sII", b"glTF", 2, total))
         stream.write(struct.pack("<I4s", len(text), b"JSON") + text)
         stream.write(struct.pack("<I4s", buffer.length, b"BIN\0"))
-        for part in buffer.parts:
-            stream.write(part)
+        buffer.stream.seek(0)
+        shutil.copyfileobj(buffer.stream, stream)
 
 
 def _facts(animation: Animation) -> dict[str, Any]:

@@ -29,6 +29,8 @@ _SKELETON_PATH, _ANIMATION_PATH = f"{SKEL_ROOT_PATH}/skeleton", f"{SKEL_ROOT_PAT
 _JOINT = "head"
 #: A vertex that a shape moves by less is left out of it (mm): below what a file's numbers hold.
 _LEAST_MM = 1e-6
+#: Shapes after which what was set goes to the file, so that memory does not hold them all.
+_FLUSH_SHAPES = 50
 
 
 def write_usd_shapes(path: str | Path, animation: Animation, basis: ShapeBasis) -> None:
@@ -75,7 +77,7 @@ def identifiers(names: tuple[str, ...]) -> list[str]:
 def _add_shapes(stage: Any, binding: Any, basis: ShapeBasis, unit_mm: float) -> None:
     names = identifiers(basis.shapes.names)
     targets = binding.CreateBlendShapeTargetsRel()
-    for name, shape in zip(names, basis.shapes.shapes_mm, strict=True):
+    for done, (name, shape) in enumerate(zip(names, basis.shapes.shapes_mm, strict=True), start=1):
         moved = np.flatnonzero(np.abs(shape).max(axis=1) > _LEAST_MM)
         moved = moved if len(moved) else np.array([0])
         prim = UsdSkel.BlendShape.Define(stage, f"{MESH_PATH}/{name}")
@@ -83,6 +85,8 @@ def _add_shapes(stage: Any, binding: Any, basis: ShapeBasis, unit_mm: float) -> 
         ids = np.ascontiguousarray(moved, dtype=np.int32)
         prim.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(ids))
         targets.AddTarget(prim.GetPath())
+        if done % _FLUSH_SHAPES == 0:
+            stage.GetRootLayer().Save()
     binding.CreateBlendShapesAttr(Vt.TokenArray(names))
 
 
