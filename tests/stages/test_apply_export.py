@@ -91,7 +91,7 @@ def export(root, out, options, **more):
         "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
         "overlay": "overlay.mp4", "timeline": "timeline.png", "full": "full.npy",
         "plate": "plate", "albedo": "albedo.png", "live_link": "live_link.csv", "rig": "rig.csv",
-        "corrective": "rig_corrective.obj", "on_head": "head.npy", **FILES,
+        "corrective": "rig_corrective.obj", "on_head": "head.npy", "flame": "flame.npz", **FILES,
     }  # fmt: skip
     run_script(
         "apply/apply_export",
@@ -163,6 +163,54 @@ def test_another_trackers_sequence_goes_back_to_its_own_world_unit_and_polygons(
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     # The world of the capture is that of corrected.npy, as for every base.
     assert np.array_equal(np.load(tmp_path / "corrected.npy"), corrected)
+
+
+def flame_base(root, tracker, origin, placement):
+    """The track of `take` as parameters of a model that has the tracker's expressions: files and arguments."""
+    fit, person = TrackedTake.load(root / "fit.npz"), Identity.load(root / "identity.npz")
+    rest, count = person.neutral_mm / 1000.0, tracker.n_vertices
+    shapes = np.zeros((count, 3, 300 + tracker.n_expressions))
+    shapes[..., 300:] = np.moveaxis(tracker.expressions_mm, 0, 2) / 1000.0
+    joints, skinning = np.zeros((5, count)), np.zeros((count, 5))
+    joints[:, 0], skinning[:, 1] = 1.0, 1.0
+    np.savez(
+        root / "flame_model.npz", v_template=rest, f=tracker.triangles, shapedirs=shapes,
+        posedirs=np.zeros((count, 3, 36)), J_regressor=joints, weights=skinning,
+        kintree_table=np.array([[0, 0, 1, 1, 1]]),
+    )  # fmt: skip
+    into = origin.axes @ placement.rotation.T
+    turns = into @ fit.world_from_head_rotation
+    moved = rest[0] + (shapes[0, :, 300:] @ fit.weights.T).T  # the root, in each frame
+    places = np.einsum("fij,fj->fi", turns, moved) - moved - into @ placement.translation_mm / 1000
+    np.savez(
+        root / "parameters.npz", shape=np.zeros(10), expr=fit.weights, jaw_pose=np.zeros((6, 3)),
+        rotation=Rotation.from_matrix(turns).as_rotvec(), translation=places, frames=FRAMES,
+    )  # fmt: skip
+    return {"parameters": root / "parameters.npz", "flame_model": root / "flame_model.npz"}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_parameters_of_flame_come_out_for_the_corrected_lips(take, tmp_path, capsys, turned):
+    root, _, tracker, corrected = take
+    turn = Rotation.from_euler("xyz", [180, 20, 5], degrees=True).as_matrix()
+    placement = Placement(turn, np.array([40.0, -30, 250]), 0.0, False)
+    polygons = Polygons.of_triangles(tracker.triangles)
+    origin = Origin(1000.0, "z" if turned else "y", turned, polygons, 20)
+    placement.save(tmp_path / "placement.npz")
+    origin.save(tmp_path / "origin.npz")
+    own = {name: tmp_path / f"{name}.npz" for name in ("placement", "origin")}
+    own |= flame_base(root, tracker, origin, placement)
+    wanted = origin.in_file(placement.undo(corrected))  # metres
+    lips = tracker.regions["vermilion_upper"] | tracker.regions["vermilion_lower"]
+
+    def off_mm(path):
+        back = read_tracked(path, FRAMES, 1000.0, flame=own["flame_model"]).vertices_mm
+        return np.linalg.norm(back - 1000 * wanted, axis=2)[:, lips].mean()
+
+    assert off_mm(own["parameters"]) > 0.5  # the track, without the correction
+    export(root, tmp_path, ExportConfig(formats=[], flame=True), **own)
+    assert off_mm(tmp_path / "flame.npz") < 0.02
+    assert "FLAME, 6 frames: off over the lips" in capsys.readouterr().out
 
 
 @pytest.fixture(scope="module")

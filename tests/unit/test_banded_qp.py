@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from vermilion.export.smoothed_gram import SmoothedGram
 from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
 
 
@@ -54,3 +55,16 @@ def test_an_infinite_box_is_no_box():
     matrix, full, right = problem(5)
     found = solve_in_box(matrix, right, -np.inf, np.inf)
     assert np.allclose(full @ found.reshape(-1), right.reshape(-1), atol=1e-8)
+
+
+@pytest.mark.parametrize("bound", [0.05, 9.0, np.inf])
+def test_one_gram_for_all_frames_needs_no_band(bound):
+    rng = np.random.default_rng(8)
+    shapes = rng.normal(0, 1, (6, 20))
+    gram, right = shapes @ shapes.T, rng.normal(0, 6, (9, 6))
+    band = BandMatrix(np.tile(gram, (9, 1, 1)), np.zeros((7, 6)), np.full((8, 6), 0.7))
+    fast = SmoothedGram(gram, 9, 0.7)
+    assert np.allclose(fast.times(right), band.times(right))
+    wanted = solve_in_box(band, right, -bound, bound)
+    assert (np.abs(wanted) == bound).any() == (bound < 1)
+    assert np.abs(solve_in_box(fast, right, -bound, bound) - wanted).max() < 1e-6

@@ -93,3 +93,28 @@ def test_a_sequence_that_is_not_there_is_named_before_any_job(tmp_path):
         load_configuration(raw, "mine.yaml")
     for words in ("base.weights: found no 'w/s_rom.csv'", "base.model: found no 'other.npz'"):
         assert f"mine.yaml, key tracking.external.{words}" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("source", "flame", "more", "words"),
+    [
+        (None, None, {}, "apply.export.flame: found true; expected false, since the base is our own"),
+        ("t/shot.npz", None, {}, "tracking.external.flame: found nothing; expected your FLAME model"),
+        ("t/shot.usd", "flame.npz", {}, "the base s/shot_ft is 't/shot.usd', which holds meshes"),
+        (
+            "t/shot.npz", "flame.npz", {"guided": {"takes": {"s/rom": "H"}}},
+            "guided.takes corrects the sequence H of s/rom",
+        ),
+        ("t/shot.npz", "flame.npz", {}, None),
+    ],
+)  # fmt: skip
+def test_flames_weights_need_its_parameters_and_a_model(tmp_path, source, flame, more, words):
+    rows = [] if source is None else [(*row[:3], source, *row[4:]) for row in SEQUENCES]
+    options = {"apply": {"export": {"flame": True}}, **more}
+    options["tracking"] = {"external": {"flame": flame}}
+    if words is None:
+        load(tmp_path, *CAPTURE, *rows, **options)
+        return
+    with pytest.raises(ConfigurationError) as error:
+        load(tmp_path, *CAPTURE, *rows, **options)
+    assert words in str(error.value)

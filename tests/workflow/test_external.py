@@ -39,7 +39,7 @@ READERS = (
 )  # fmt: skip
 
 
-def jobs(project, *, of, **tracking):
+def jobs(project, *, of, export=None, **tracking):
     """Rule, inputs and outputs of the jobs of the tiny capture with three sequences."""
     sheet = (project.folder / "config/takes.tiny.tsv").read_text().splitlines()
     rows = [sheet[0] + "\tof", *(line + "\t" for line in sheet[1:])]
@@ -53,6 +53,8 @@ def jobs(project, *, of, **tracking):
     settings = ["--config", "takes=config/takes.external.tsv"]
     if tracking:
         settings.append(f"tracking={json.dumps(tracking)}")
+    if export:
+        settings.append(f"apply={json.dumps({'export': export})}")
     run = project.snakemake("--dry-run", *settings)
     return jobs_of(run.stdout + run.stderr)
 
@@ -93,6 +95,18 @@ def test_weights_and_a_model_of_another_run_are_inputs(fresh_project):
     found = jobs(fresh_project, of=True, external={"base": {"model": "other.npz"}})
     assert not {"external_topology", "external_model"} & {name for name, _, _ in found}
     assert all("other.npz" in given for name, given, _ in found if name == "features")
+
+
+def test_flames_weights_are_solved_from_the_parameters_and_the_model(fresh_project):
+    (fresh_project.folder / "flame.npz").touch()
+    (fresh_project.folder / "tracks/s1_phone").mkdir(parents=True, exist_ok=True)
+    (fresh_project.folder / "tracks/s1_phone/0000.npz").touch()
+    flame = {"external": {"flame": "flame.npz"}}
+    found = jobs(fresh_project, of=True, export={"flame": True}, **flame)
+    (export,) = [(given, made) for name, given, made in found if name == "apply_export"]
+    assert "tracks/s1_phone" in export[0]
+    assert "flame.npz" in export[0]
+    assert "apply/s1/phone/flame.npz" in export[1]
 
 
 @pytest.fixture(scope="module")

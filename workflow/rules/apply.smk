@@ -64,6 +64,8 @@ def exports_to(folder, overlay, timeline, category):
     if options.rig:
         outputs["rig"] = folder + "/rig.csv"
         outputs["corrective"] = folder + "/rig_corrective.obj"
+    if options.flame:
+        outputs["flame"] = folder + "/flame.npz"
     if options.plate:
         outputs["plate"] = directory(folder + "/plate")
     if CONFIG.tracking.image_fit.enabled:
@@ -90,6 +92,9 @@ def exports_need(wildcards):
         needed["labels"] = P.head_labels.format(subject=wildcards.subject)
     if options.rig:
         needed["rig"] = options.rig
+    if options.flame:
+        needed["parameters"] = sequence_of(wildcards).source
+        needed["flame_model"] = CONFIG.tracking.external.flame
     if options.plate:
         needed["images"] = mono_images(wildcards)
     if CONFIG.tracking.image_fit.enabled:

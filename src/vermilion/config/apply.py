@@ -76,6 +76,11 @@ class ExportConfig(StageConfig):
         "vertex order of the exported mesh (mm). Its weights of the take are written as `rig.csv`, and what "
         "it cannot show as one more shape, `rig_corrective.obj`.",
     )
+    flame: bool = Field(
+        False,
+        description="Also write `flame.npz`: FLAME's jaw and expression that give the corrected lips, in the parameters "
+        "that the base was read from (docs/interchange.md). Only where the base is a sequence of such.",
+    )
     plate: bool = Field(
         False,
         description="Also write the take's images without lens distortion (`plate/<frame>.jpg`), and "

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from vermilion.config.own_head import exported_takes
 from vermilion.config.root import Configuration
 from vermilion.config.takes import Take
 
@@ -59,9 +60,43 @@ def external_problems(takes: Sequence[Take]) -> list[str]:
     return problems
 
 
+def flame_checks(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
+    """Why FLAME's weights cannot be solved for the corrected lips, a sentence each."""
+    if not configuration.apply.export.flame:
+        return
+    found = "apply.export.flame: found true; expected false, since"
+    sequences = sequences_of(takes)
+    bases = [sequences.get(take.name) for take in exported_takes(configuration, takes)]
+    meshes = [row for row in bases if row is not None and not _may_be_flame(row.source)]
+    on_h = [name for name, sequence in configuration.guided.takes.items() if sequence == "H"]
+    if not sequences:
+        yield f"{found} the base is our own tracker's, which has no parameters of FLAME."
+    elif configuration.tracking.external.flame is None:
+        yield (
+            "tracking.external.flame: found nothing; expected your FLAME model, since apply.export.flame "
+            "solves its weights. Convert it as docs/interchange.md says."
+        )
+    elif meshes:
+        yield (
+            f"{found} the base {meshes[0].name} is '{meshes[0].source}', which holds meshes. Name the "
+            "tracker's parameters (.npz, or a folder of them) in the take sheet."
+        )
+    elif on_h:
+        yield f"{found} guided.takes corrects the sequence H of {on_h[0]}, which has no parameters of FLAME."
+
+
+def _may_be_flame(source: str) -> bool:
+    """Whether a sequence has the form of parameters: an archive, or a folder of such, whose names are not looked at."""
+    path = Path(source)
+    if path.is_dir():
+        return any(path.glob("*.npz"))
+    return path.suffix.lower() == ".npz"
+
+
 def external_checks(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
     """What the configuration and the sheet of a run with such a base lack, a sentence each."""
     sequences = sequences_of(takes)
+    yield from flame_checks(configuration, takes)
     if not sequences:
         return
     without = [

@@ -34,16 +34,21 @@ def head_checks(configuration: Configuration) -> Iterator[str]:
             )
 
 
-def missing_heads(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
-    """A sentence for each file of a head that is not there."""
+def exported_takes(configuration: Configuration, takes: Sequence[Take]) -> list[Take]:
+    """The takes whose corrected files are written."""
     options = configuration.apply
     chosen = [*options.takes, *configuration.guided.takes]
-    exported = [
+    return [
         take
         for take in takes
         if take.name in chosen or (not options.takes and take.role == "video")
     ]
-    for subject in dict.fromkeys(take.subject for take in exported):
+
+
+def missing_heads(configuration: Configuration, takes: Sequence[Take]) -> Iterator[str]:
+    """A sentence for each file of a head that is not there."""
+    options = configuration.apply
+    for subject in dict.fromkeys(take.subject for take in exported_takes(configuration, takes)):
         head = options.head_of(subject)
         if head is None:
             continue

@@ -23,10 +23,13 @@ from vermilion.storage.errors import InputError
 
 SPARSE, SMOOTH = 2e-3, 2e-2  # mm^2 for a weight of 1
 _SWEEPS, _SETTLED = 400, 1e-5
-#: Rounds of weights and corrective in turn, until the lips come nearer by less than this share.
 _BLOCK = 64  # frames
+#: Rounds of weights and corrective in turn, until the lips come nearer by less than this share. Constants, since they
+#: trade time alone. Lips that one shape outside the rig moves are 0.070 mm off after the first round, 0.004 after 20
+#: and after 80; lips on the far side of one of the rig's shapes 0.32, 0.15 and 0.08 of 1.24 mm. A share of 0.01 ends
+#: neither of these earlier.
 _ROUNDS, _GAIN = 20, 0.001
-_LIPS = 6.0  # weight of a vertex of the lips against one of the face
+LIPS = 6.0  # weight of a vertex of the lips against one of the face
 _NEUTRAL = "neutral"
 
 
@@ -108,7 +111,7 @@ def solve_rig(animation: Animation, rig: NamedShapes, lips: np.ndarray) -> RigWe
     for index, row in enumerate(rows):
         world = np.asarray(animation.vertices_mm[row], dtype=np.float64)
         moved[index] = animation.head.to_head(row, world) - animation.neutral_mm
-    trust = np.where(lips, _LIPS, 1.0)
+    trust = np.where(lips, LIPS, 1.0)
     shapes = np.asarray(rig.shapes_mm, dtype=np.float64)
     scaled = shapes * (trust / trust.sum())[:, None]
     flat = scaled.reshape(len(shapes), -1)

@@ -1,113 +1,95 @@
-"""Sequences of parameters of FLAME (Li et al. 2017), whose meshes the user's own model file gives.
+"""Sequences of parameters of FLAME, whose meshes the user's own model file gives (`external.flame_model`).
 
-The names are those that VHAP writes. With v the template, S shape and expression, P pose correctives, J the
-joints' regressor, and R_j the rotations of root, neck, jaw and eyes,
+The names are those that VHAP writes. Our own files have one more, `corrective` with its weights (`export.flame`):
 
-    shaped = v + S (shape, expr) + static_offset;   posed = shaped + P (R_j - 1, j > 0)
-
-and `posed` is skinned (linear blend skinning) by the joints J shaped, and moved by the translation.
+    offset_f = static_offset + corrective_weight_f * corrective
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.spatial.transform import Rotation
 
+from vermilion.external.flame_model import SHAPES, Flame, read_flame_model
 from vermilion.external.sequence import RawSequence, Request, filled
 from vermilion.geometry.polygons import Polygons
-from vermilion.storage.arrays import read_arrays
+from vermilion.imaging.numbering import numbered_files
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import InputError
 
-#: Coefficients of shape in FLAME's `shapedirs`; those of expression follow.
-_SHAPES = 300
-_MODEL = ("v_template", "f", "shapedirs", "posedirs", "J_regressor", "weights", "kintree_table")
 #: Parameters a file must have, and those that are zero where it has none: name -> numbers a frame.
 _NEEDED = ("shape", "expr", "jaw_pose")
 _POSES = {"rotation": 3, "neck_pose": 3, "jaw_pose": 3, "eyes_pose": 6}
-_METRE_MM = 1000.0
+_CORRECTIVE, _WEIGHT = "corrective", "corrective_weight"
+METRE_MM = 1000.0
 
 
 @dataclass(frozen=True)
-class Flame:
-    """The user's model.
+class FlameTake:
+    """Parameters of a take.
 
     Attributes:
-        template: (V, 3) metres.
-        faces: (T, 3).
-        shapes: (V, 3, S) displacements of shape and expression.
-        pose_shapes: (V, 3, 9 (K - 1)) displacements of the joints' rotations.
-        joints: (K, V) sparse, joints of vertices.
-        weights: (V, K) of the skinning.
-        parents: (K,) joint above each; that of the root is not used.
+        model: the user's.
+        frames: (F,) numbers.
+        shape: (S,) coefficients of the person.
+        expr: (F, E) coefficients of expression.
+        poses: (F, 15) rotation vectors of root, neck, jaw and eyes.
+        translation: (F, 3) metres.
+        offset: (W, 3) of the person, metres; V of the model's vertices, then those that the tracker added.
+        corrective: (V, 3) metres, a shape that stands beside the offset.
+        corrective_weight: (F,) its weights.
+        lost: frame -> why it is lost.
     """
 
-    template: np.ndarray
-    faces: np.ndarray
-    shapes: np.ndarray
-    pose_shapes: np.ndarray
-    joints: sparse.csr_matrix
-    weights: np.ndarray
-    parents: np.ndarray
+    model: Flame
+    frames: np.ndarray
+    shape: np.ndarray
+    expr: np.ndarray
+    poses: np.ndarray
+    translation: np.ndarray
+    offset: np.ndarray
+    corrective: np.ndarray
+    corrective_weight: np.ndarray
+    lost: dict[int, str] = field(default_factory=dict)
 
-    def vertices(
-        self, coefficients: np.ndarray, offset: np.ndarray, turns: np.ndarray
-    ) -> np.ndarray:
-        """The mesh (V, 3) of one frame before its translation, metres.
+    @property
+    def turns(self) -> np.ndarray:
+        """Rotation vectors (F, K, 3) of the model's joints."""
+        return self.poses.reshape(len(self.poses), -1, 3)[:, : len(self.model.parents)]
 
-        Args:
-            coefficients: (S,) of shape and expression.
-            offset: (V, 3) of the person.
-            turns: (K, 3) rotation vectors of the joints, each in the frame of the one above.
-        """
-        shaped = self.template + self.shapes @ coefficients + offset
-        rotations = Rotation.from_rotvec(turns).as_matrix()
-        posed = shaped + self.pose_shapes @ (rotations[1:] - np.eye(3)).ravel()
-        places = self.joints @ shaped
-        turn, shift = np.empty((len(turns), 3, 3)), np.empty((len(turns), 3))
-        for joint, parent in enumerate(self.parents):
-            above_turn, above = (
-                (np.eye(3), np.zeros(3)) if joint == 0 else (turn[parent], shift[parent])
-            )
-            turn[joint] = above_turn @ rotations[joint]
-            # A joint stays where the one above takes it.
-            shift[joint] = above_turn @ places[joint] + above - turn[joint] @ places[joint]
-        moved = np.einsum("kij,vj->vki", turn, posed) + shift
-        return (self.weights[:, :, None] * moved).sum(axis=1)
+    @property
+    def own_offset(self) -> np.ndarray:
+        """The offset (V, 3) of the model's own vertices."""
+        return self.offset[: len(self.model.template)]
 
+    def vertices(self, row: int) -> np.ndarray:
+        """The mesh (V, 3) of a frame, metres."""
+        offset = self.own_offset + self.corrective_weight[row] * self.corrective
+        shaped = self.model.shaped(self.shape, self.expr[row], offset)
+        return self.model.pose(shaped, self.turns[row]).vertices + self.translation[row]
 
-def read_flame_model(request: Request) -> Flame:
-    """Read the model file that the request names.
-
-    Raises InputError where there is none, or its arrays are not those of FLAME.
-    """
-    if request.flame is None:
-        raise request.error(
-            "parameters of FLAME", "your model file in `tracking.external.flame`",
-            "Convert it to .npz as docs/interchange.md says.",
+    def of_rows(self, rows: np.ndarray) -> FlameTake:
+        """The frames of `rows` (n,) int."""
+        return replace(
+            self, frames=self.frames[rows], expr=self.expr[rows], poses=self.poses[rows],
+            translation=self.translation[rows], corrective_weight=self.corrective_weight[rows],
         )  # fmt: skip
-    remedy = "Convert the model as docs/interchange.md says."
-    found = read_arrays(request.flame, "FLAME model", _MODEL, remedy=remedy, **request.place)
-    template, weights = (found[name].astype(np.float64) for name in ("v_template", "weights"))
-    shapes, poses = (found[name].astype(np.float64) for name in ("shapedirs", "posedirs"))
-    joints, faces = sparse.csr_matrix(found["J_regressor"].astype(np.float64)), found["f"]
-    count, n_joints = len(template), weights.shape[-1]
-    wanted = {
-        "v_template": (template.shape, (count, 3)), "weights": (weights.shape, (count, n_joints)),
-        "shapedirs": (shapes.shape[:2], (count, 3)), "J_regressor": (joints.shape, (n_joints, count)),
-        "posedirs": (poses.shape, (count, 3, 9 * (n_joints - 1))), "f": (faces.shape[1:], (3,)),
-    }  # fmt: skip
-    for name, (shape, expected) in wanted.items():
-        if shape != expected:
-            raise request.error(
-                f"{name} of shape {shape}", f"{expected}", remedy, path=request.flame
-            )
-    parents = np.asarray(found["kintree_table"])[0].astype(np.int64)
-    return Flame(template, faces.astype(np.int32), shapes, poses, joints, weights, parents)
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, float32, as `read_parameters` reads it."""
+        ends = np.cumsum(list(_POSES.values()))[:-1]
+        poses = dict(zip(_POSES, np.split(self.poses, ends, axis=1), strict=True))
+        tables = poses | {
+            "shape": self.shape, "expr": self.expr, "translation": self.translation,
+            "static_offset": self.offset[None], _CORRECTIVE: self.corrective,
+            _WEIGHT: self.corrective_weight,
+        }  # fmt: skip
+        single: dict[str, Any] = {k: table.astype(np.float32) for k, table in tables.items()}
+        write_arrays(path, frames=np.asarray(self.frames, np.int64), **single)
 
 
 def is_flame(names: Mapping[str, object] | set[str]) -> bool:
@@ -117,6 +99,47 @@ def is_flame(names: Mapping[str, object] | set[str]) -> bool:
 
 def read_flame(request: Request, parameters: Mapping[str, np.ndarray]) -> RawSequence:
     """The meshes of `parameters` (F, c) by name, of one file; frames count from 0 where it has no `frames`.
+
+    Raises InputError where there is no model, or parameters are missing or do not go with it.
+    """
+    return _meshes(request, take_of(request, parameters))
+
+
+def read_flame_folder(request: Request, paths: Mapping[int, Path]) -> RawSequence:
+    """The same of a file a frame, `paths` by frame number; one that is damaged costs its frame.
+
+    Raises InputError where no frame can be read.
+    """
+    joined, lost = _joined(request, paths)
+    found = _meshes(request, take_of(request, joined))
+    return replace(found, lost=found.lost | lost)
+
+
+def read_parameters(request: Request) -> FlameTake:
+    """The parameters of a file or folder, of all frames asked for that it has.
+
+    Raises InputError where there are none, there is no model, or they do not go with it.
+    """
+    if request.path.is_dir():
+        paths = numbered_files(request.path, [".npz"])
+        found: Mapping[str, np.ndarray] = _joined(request, paths)[0] if paths else {}
+    else:
+        is_archive = request.path.suffix.lower() == ".npz"
+        found = (
+            read_arrays(request.path, "parameters of FLAME", **request.place) if is_archive else {}
+        )
+    if not is_flame(found):
+        raise request.error(
+            "meshes", "parameters of FLAME (expr, jaw_pose), whose weights are solved",
+            "Set `apply.export.flame: false`, or name the tracker's parameters in the take sheet.",
+        )  # fmt: skip
+    take = take_of(request, found)
+    rows = {int(number): row for row, number in enumerate(take.frames)}
+    return take.of_rows(np.array([rows[frame] for frame in request.frames if frame in rows]))
+
+
+def take_of(request: Request, parameters: Mapping[str, np.ndarray]) -> FlameTake:
+    """All frames of the `parameters` (F, c) by name; those asked for that are not there are lost.
 
     Raises InputError where there is no model, or parameters are missing or do not go with it.
     """
@@ -130,33 +153,43 @@ def read_flame(request: Request, parameters: Mapping[str, np.ndarray]) -> RawSeq
     numbers = np.asarray(parameters.get("frames", np.arange(len(expr)))).astype(int).tolist()
     lost = request.absent(numbers)
     shape = np.asarray(parameters["shape"], dtype=np.float64).reshape(-1)
-    if len(shape) > _SHAPES or _SHAPES + expr.shape[1] > model.shapes.shape[2]:
+    if len(shape) > SHAPES or expr.shape[1] > model.n_expressions:
         raise request.error(
             f"{len(shape)} coefficients of shape and {expr.shape[1]} of expression",
-            f"at most {_SHAPES} and {model.shapes.shape[2] - _SHAPES}, as the model has",
+            f"at most {SHAPES} and {model.n_expressions}, as the model has",
             "Name the model that the tracker used in `tracking.external.flame`.",
         )
-    turns = np.concatenate(
-        [_frames(request, parameters, name, len(expr), width) for name, width in _POSES.items()], axis=1
-    ).reshape(len(expr), -1, 3)[:, : len(model.parents)]  # fmt: skip
-    places = _frames(request, parameters, "translation", len(expr), 3)
-    offset = _offset(request, parameters, len(model.template))
-    meshes, rows = {}, {number: row for row, number in enumerate(numbers)}
-    for frame in request.frames:
-        if frame in rows:
-            row, coefficients = rows[frame], np.zeros(model.shapes.shape[2])
-            coefficients[: len(shape)] = shape
-            coefficients[_SHAPES : _SHAPES + expr.shape[1]] = expr[row]
-            meshes[frame] = model.vertices(coefficients, offset, turns[row]) + places[row]
-    return RawSequence(
-        np.array(request.frames), filled(request.frames, meshes), Polygons.of_triangles(model.faces),
-        unit_mm=_METRE_MM, up="y", lost=lost,
-        facts=(f"parameters of FLAME, {len(expr)} frames, {expr.shape[1]} of expression",),
+    count, n_vertices = len(expr), len(model.template)
+    poses = [_frames(request, parameters, name, count, width) for name, width in _POSES.items()]
+    weight = _frames(request, parameters, _WEIGHT, count, 1)[:, 0]
+    corrective = np.asarray(parameters.get(_CORRECTIVE, np.zeros((n_vertices, 3))), np.float64)
+    if corrective.shape != (n_vertices, 3):
+        raise request.error(
+            f"a corrective of shape {corrective.shape}", f"{(n_vertices, 3)}, as the model has",
+            "Name the model that the tracker used in `tracking.external.flame`.",
+        )  # fmt: skip
+    return FlameTake(
+        model, np.array(numbers), shape, expr.astype(np.float64), np.concatenate(poses, axis=1),
+        _frames(request, parameters, "translation", count, 3),
+        _offset(request, parameters, n_vertices), corrective, weight, lost,
     )  # fmt: skip
 
 
-def read_flame_folder(request: Request, paths: Mapping[int, Path]) -> RawSequence:
-    """The same of a file a frame, `paths` by frame number; one that is damaged costs its frame.
+def _meshes(request: Request, take: FlameTake) -> RawSequence:
+    rows = {int(number): row for row, number in enumerate(take.frames)}
+    meshes = {frame: take.vertices(rows[frame]) for frame in request.frames if frame in rows}
+    fact = f"parameters of FLAME, {len(take.frames)} frames, {take.expr.shape[1]} of expression"
+    return RawSequence(
+        np.array(request.frames), filled(request.frames, meshes),
+        Polygons.of_triangles(take.model.faces), unit_mm=METRE_MM, up="y", lost=take.lost,
+        facts=(fact,),
+    )  # fmt: skip
+
+
+def _joined(
+    request: Request, paths: Mapping[int, Path]
+) -> tuple[dict[str, np.ndarray], dict[int, str]]:
+    """Parameters (F, c) by name of a file a frame, and the frames that are lost.
 
     Raises InputError where no frame can be read.
     """
@@ -177,15 +210,15 @@ def read_flame_folder(request: Request, paths: Mapping[int, Path]) -> RawSequenc
         name: np.concatenate([np.atleast_2d(t[name]) for t in tables.values()]) for name in names
     }
     joined |= {name: first[name] for name in ("shape", "static_offset") if name in first}
-    found = read_flame(request, joined | {"frames": np.array(list(tables))})
-    return replace(found, lost=found.lost | lost)
+    return joined | {"frames": np.array(list(tables))}, lost
 
 
 def _frames(
     request: Request, parameters: Mapping[str, np.ndarray], name: str, count: int, width: int
 ) -> np.ndarray:
     """A parameter (count, width), zero where the file has none."""
-    values = np.atleast_2d(parameters.get(name, np.zeros((count, width)))).astype(np.float64)
+    values = np.asarray(parameters.get(name, np.zeros((count, width)))).astype(np.float64)
+    values = values[:, None] if values.ndim == 1 and width == 1 else np.atleast_2d(values)
     if values.shape != (count, width):
         raise request.error(
             f"{name} of shape {values.shape}", f"{(count, width)}", "Export the parameters again."
@@ -194,7 +227,7 @@ def _frames(
 
 
 def _offset(request: Request, parameters: Mapping[str, np.ndarray], n_vertices: int) -> np.ndarray:
-    """The person's offset (V, 3); vertices that the tracker added to the model (teeth) are left out."""
+    """The person's offset (W, 3), also of vertices that the tracker added to the model (teeth)."""
     found = np.asarray(parameters.get("static_offset", np.zeros((n_vertices, 3))), np.float64)
     found = found.reshape(-1, 3)
     if len(found) < n_vertices:
@@ -202,4 +235,4 @@ def _offset(request: Request, parameters: Mapping[str, np.ndarray], n_vertices: 
             f"a static_offset of {len(found)} vertices", f"{n_vertices}, as the model has",
             "Name the model that the tracker used in `tracking.external.flame`.",
         )  # fmt: skip
-    return found[:n_vertices]
+    return found

@@ -10,6 +10,7 @@ from vermilion.appearance.estimate import Appearance
 from vermilion.config.apply import ExportConfig
 from vermilion.export.albedo_texture import albedo_texture
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
+from vermilion.export.flame import solve_flame
 from vermilion.export.full_topology import FullFace, shapes_on_coarse
 from vermilion.export.head_binding import HeadBinding
 from vermilion.export.head_file import read_head
@@ -25,8 +26,10 @@ from vermilion.export.rig import read_rig, solve_rig
 from vermilion.export.shape_basis import shape_basis
 from vermilion.export.timeline import draw_timeline
 from vermilion.export.weights import write_weights
+from vermilion.external.flame import read_parameters
 from vermilion.external.origin import Origin
 from vermilion.external.placement import Placement
+from vermilion.external.sequence import Request
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.mesh import Mesh
 from vermilion.geometry.mesh_files import write_ply
@@ -147,6 +150,22 @@ def write_rigs(snakemake, options, coarse, animation, face, other):
         write_obj(out.corrective, shown, animation.polygons, animation.uv, animation.uv_corners)
 
 
+def write_flame(snakemake, coarse, face, placement, origin):
+    """Jaw and expression of FLAME for the corrected lips, in the parameters of the base."""
+    place = {name: snakemake.wildcards[name] for name in ("subject", "take")}
+    path, model = Path(snakemake.input.parameters), Path(snakemake.input.flame_model)
+    frames = [int(frame) for frame in coarse.frames]
+    track = read_parameters(Request(path, frames, place=place, flame=model))
+    own = in_own_frame(coarse, placement, origin)
+    rigid, skin = face.regions["rigid"], face.regions["face"]
+    found = solve_flame(own, track, lips_of(face), skin, rigid)
+    found.take.save(snakemake.output.flame)
+    kinds = ("jaw and expression alone", "the static offset", "offset and corrective")
+    off = (found.alone_mm, found.offset_mm, found.corrected_mm)
+    said = ", ".join(f"{x.mean():.3f} mm with {kind}" for x, kind in zip(off, kinds, strict=True))
+    print(f"FLAME, {len(found.take.frames)} frames: off over the lips {said}")
+
+
 def lips_of(model):
     """Vertices (V,) of the vermilion."""
     return model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
@@ -178,12 +197,15 @@ def main(snakemake):
     animation = add_images(snakemake, animation, face, other, options)
     if inputs.get("placement"):
         placement, origin = Placement.load(inputs.placement), Origin.load(inputs.origin)
+        if options.flame:
+            write_flame(snakemake, coarse, face, placement, origin)
         animation = in_own_frame(animation, placement, origin, own_polygons=other is None)
 
     def basis():
+        folder = Path(out.corrected).parent  # the system's for temporary files may be memory
         if options.topology == "full":
-            return other.basis(shape_basis(coarse, options.tolerance_mm))
-        return shape_basis(animation, options.tolerance_mm)
+            return other.basis(shape_basis(coarse, options.tolerance_mm, folder))
+        return shape_basis(animation, options.tolerance_mm, folder)
 
     write_packages({name: out[name] for name in options.formats}, animation, basis)
 

@@ -7,8 +7,20 @@ that one exact solve covers the whole take and the result does not depend on chu
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from scipy.linalg import solveh_banded
+
+
+class ProgramMatrix(Protocol):
+    """What `solve_in_box` asks of a symmetric matrix over unknowns (F, P)."""
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Product (F, P) with x (F, P)."""
+
+    def solve_free(self, right: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Solution (F, P) for `right` (F, P) over the `free` (F, P) bool unknowns, the others zero."""
 
 
 class BandMatrix:
@@ -77,7 +89,7 @@ class BandMatrix:
 
 
 def solve_in_box(
-    matrix: BandMatrix,
+    matrix: ProgramMatrix,
     right: np.ndarray,
     lower: np.ndarray | float,
     upper: np.ndarray | float,
