@@ -1,4 +1,4 @@
-"""FLAME's jaw and expression for corrected lips: what parameters, static offset and corrective leave; speed, memory.
+"""FLAME's jaw and expression for corrected lips: what is left of them, speed and memory.
 
 FLAME itself may not be passed on. Its stand-in has the embedded model's mesh (about as many vertices), a jaw with
 the embedded model's `jawOpen` as its weights, and as expressions the principal components of random faces of its
