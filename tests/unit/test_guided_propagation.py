@@ -152,7 +152,7 @@ def test_a_file_that_is_no_propagator_is_named(tmp_path):
     with pytest.raises(ModelFileError, match="format 7"):
         LipPropagator.load(path)
     np.savez(path, propagator_version=np.int64(1))
-    with pytest.raises(ModelFileError, match="no neutral_mm"):
+    with pytest.raises(ModelFileError, match=r"no array 'triangles'.*Train it again"):
         LipPropagator.load(path)
     path.write_bytes(b"not an archive")
     with pytest.raises(ModelFileError, match="unreadable lip propagator"):

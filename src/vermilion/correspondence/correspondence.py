@@ -16,8 +16,7 @@ from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import Mesh, connected_parts, triangle_normals, unique_edges
 from vermilion.geometry.registration import LandmarkTargets, Schedule, register
 from vermilion.geometry.surface_points import SurfacePoints
-from vermilion.storage.arrays import format_version, read_arrays, write_arrays
-from vermilion.storage.errors import InputError
+from vermilion.storage.arrays import read_arrays, write_arrays
 
 FORMAT_VERSION = 1
 
@@ -80,15 +79,7 @@ class Correspondence:
     @classmethod
     def load(cls, path: str | Path) -> Correspondence:
         """Read what `save` wrote. Raises InputError on a damaged file or another format."""
-        arrays = read_arrays(path, "correspondence")
-        version = format_version(arrays)
-        if version != FORMAT_VERSION:
-            raise InputError(
-                f"correspondence format {version}",
-                f"format {FORMAT_VERSION}",
-                "Remove the file and run again.",
-                path=path,
-            )
+        arrays = read_arrays(path, "correspondence", version=FORMAT_VERSION)
         names = ("mask", "rigid", "accurate_triangles", "coarse_triangles", "coarse_neutral_mm")
         return cls(
             SurfacePoints(

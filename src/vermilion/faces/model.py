@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vermilion.storage.arrays import format_version, read_arrays, write_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
@@ -120,15 +120,7 @@ class FaceModel:
     @classmethod
     def load(cls, path: str | Path) -> FaceModel:
         """Read what `save` wrote. Raises ModelFileError on a newer or damaged file."""
-        arrays = read_arrays(path, "face model", error=ModelFileError)
-        version = format_version(arrays)
-        if version != FORMAT_VERSION:
-            raise ModelFileError(
-                f"face model format {version}",
-                f"format {FORMAT_VERSION}",
-                "Rebuild it with this version of Vermilion.",
-                path=path,
-            )
+        arrays = read_arrays(path, "face model", error=ModelFileError, version=FORMAT_VERSION)
         return cls(
             name=str(arrays["name"]),
             neutral_mm=arrays["neutral_mm"],

@@ -203,7 +203,7 @@ class LipPropagator:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read what `save` wrote. Raises ModelFileError on a newer or damaged file."""
-        arrays = read_arrays(path, "lip propagator", error=ModelFileError)
+        arrays = read_arrays(path, "lip propagator", error=ModelFileError, remedy="Train it again.")
         version = int(arrays.get("propagator_version", -1))
         if version != FORMAT_VERSION:
             raise ModelFileError(
@@ -212,22 +212,6 @@ class LipPropagator:
                 "Train it again with this version of Vermilion.",
                 path=path,
             )
-        names = (
-            "neutral_mm",
-            "stable",
-            "follow_mm",
-            "base",
-            "scale",
-            "triangles",
-            "predicted",
-            "trusted",
-        )
-        missing = [name for name in names if name not in arrays]
-        if missing:
-            raise ModelFileError(
-                f"no {', '.join(missing)}", "all arrays of a propagator", "Train it again.",
-                path=path,
-            )  # fmt: skip
         regions = GuidedRegions.from_arrays(arrays)
         result = cls(arrays["neutral_mm"], regions, arrays["stable"], float(arrays["follow_mm"]))
         result.base, result.scale = bool(arrays["base"]), float(arrays["scale"])

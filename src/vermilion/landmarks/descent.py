@@ -17,7 +17,7 @@ from vermilion.landmarks.gradients import grey_of, orientation_channels, patch_f
 from vermilion.landmarks.locate import FaceLocator
 from vermilion.landmarks.scheme import face_size_px
 from vermilion.landmarks.sets import IBUG66
-from vermilion.storage.arrays import format_version, read_arrays, write_arrays
+from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.errors import ModelFileError
 
 FORMAT_VERSION = 1
@@ -153,13 +153,7 @@ class DescentDetector:
     @classmethod
     def load(cls, path: str | Path) -> DescentDetector:
         """Read what `save` wrote. Raises ModelFileError on another or damaged file."""
-        hint = "Remove the file and run again."
-        arrays = read_arrays(path, "landmark model", error=ModelFileError)
-        version = format_version(arrays)
-        if version != FORMAT_VERSION:
-            raise ModelFileError(
-                f"landmark model format {version}", f"format {FORMAT_VERSION}", hint, path=path
-            )
+        arrays = read_arrays(path, "landmark model", error=ModelFileError, version=FORMAT_VERSION)
         return cls(
             arrays["mean"],
             arrays["steps"].astype(np.float32),

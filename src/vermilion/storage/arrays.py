@@ -71,6 +71,7 @@ def read_arrays(
     error: type[PlacedError] = InputError,
     *,
     remedy: str = "Remove the file and run again.",
+    version: int | None = None,
     **place: Any,
 ) -> Arrays:
     """Read the arrays of a file: those named, or all.
@@ -81,6 +82,7 @@ def read_arrays(
         error: raised, with the `place` (subject, take, ...), where the file is missing, damaged or
             without an array.
         remedy: what to do then.
+        version: what `format_version` among the arrays must be; None: nothing.
     """
     wanted = None if names is None else list(names)
 
@@ -94,11 +96,15 @@ def read_arrays(
         _check_archive(path)
         with np.load(path, allow_pickle=False) as data:
             found = data.files if wanted is None else wanted
-            return Arrays(
+            arrays = Arrays(
                 {name: data[name] for name in found}, lambda name: unreadable(f"no array '{name}'")
             )
     except DAMAGE as cause:
         raise unreadable(_one_line(cause)) from cause
+    if version is not None and format_version(arrays) != version:
+        was, wants = f"{what} format {format_version(arrays)}", f"format {version}"
+        raise error(was, wants, remedy, path=path, **place)
+    return arrays
 
 
 def read_array(path: str | Path, what: str, **place: Any) -> np.ndarray:
