@@ -38,7 +38,10 @@ def start_held(project, cluster, profile, *options) -> subprocess.Popen:
 def test_a_job_over_its_limit_is_retried_with_more(cluster, rigs, first, fault):
     project, expected = rigs
     what, least = first.split("=")
-    old = {"runtime": "growing(30)", "mem_mb": "growing(1500 + len(take.frames))"}[what]
+    old = {
+        "runtime": "growing(30)",
+        "mem_mb": "growing(1500 + len(take.frames) + 140 * sum(megapixels_of(take)))",
+    }[what]
     rules = "workflow/rules/studio.smk"
     project.edit(rules, f"{what}={old}", first)
     limit = "".join(letter for letter in least if letter.isdigit())
@@ -161,3 +164,16 @@ def test_jobs_refuse_code_that_was_edited_after_the_run_began(cluster, rigs, pro
     finish(project.start(*RIGS, *on(profile)), project, expected, cluster)
     assert (project.folder / "edited.txt").exists()
     assert all(row in [r[0] for r in project.started()][2:] for row in running)
+
+
+@BOTH
+def test_jobs_refuse_rules_that_were_edited_after_the_run_began(cluster, rigs, profile):
+    project, expected = rigs
+    run = start_held(project, cluster, profile)
+    running = {row[0] for row in project.started()}
+    project.edit("workflow/rules/guided.smk", "rule guided_train:", "# Edited.\nrule guided_train:")
+    project.release()
+    assert run.wait(timeout=300) != 0
+    assert files_of(project.results).items() <= expected.items()
+    assert {row[0] for row in project.started()} == running
+    finish(project.start(*RIGS, *on(profile)), project, expected, cluster)
