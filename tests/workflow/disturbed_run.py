@@ -9,6 +9,7 @@ import signal
 import subprocess
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,7 +37,7 @@ class Results:
     def digests(self) -> dict[str, str]:
         """Relative path -> SHA-256, of every file that is compared and not hidden."""
         found = {}
-        for path in sorted(self.folder.rglob("*")):
+        for path in sorted(_below(self.folder)):
             name = path.relative_to(self.folder)
             if name.parts[0] in NOT_COMPARED or name.name == "seconds.tsv":
                 continue
@@ -53,8 +54,8 @@ class Results:
         """Files and folders that a writer has not given their names, in the way of Vermilion."""
         return [
             path.as_posix()
-            for path in self.folder.rglob(".*")
-            if not path.name.startswith(".snakemake")
+            for path in _below(self.folder)
+            if path.name.startswith(".") and not path.name.startswith(".snakemake")
         ]
 
     def _digest(self, path: Path) -> str:
@@ -211,6 +212,12 @@ class DisturbedRun:
 
     def _tail(self) -> str:
         return self.printed.read_text(errors="replace")[-4000:]
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """All files and folders below a folder, also where some vanish meanwhile (`rglob` ends then)."""
+    for place, folders, files in os.walk(folder):
+        yield from (Path(place) / name for name in (*folders, *files))
 
 
 def _descendants(pid: int) -> list[psutil.Process]:
