@@ -54,6 +54,7 @@ def megapixels_of_job(wildcards):
 
 @functools.cache
 def megapixels_of(take):
+    """Megapixels of each camera's image of a take; headers are read once a run."""
     return frame_megapixels(take, CONFIG.studio, CONFIG.capture.reading)
 
 
