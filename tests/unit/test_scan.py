@@ -220,7 +220,7 @@ def test_a_scan_without_a_face_is_said_so(generic, monkeypatch):
     monkeypatch.setattr("vermilion.scan.landmarks._SIZE_PX", 48)  # whoever is blind needs no more
     ball = trimesh.creation.icosphere(subdivisions=4)
     mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))
-    with pytest.raises(InputError, match="subject anna: found no face in 24 views"):
+    with pytest.raises(InputError, match="subject anna: found no face in 168 views"):
         find_landmarks(mesh, Blind(), generic.neutral_mm[generic.landmarks], "anna")
 
 
@@ -239,6 +239,21 @@ def test_a_surer_face_of_another_shape_is_no_face(generic, monkeypatch):
         else:
             return Landmarks.none(), np.full((66, 3), np.nan)
         return Landmarks(camera.project(points), np.full(66, confidence), True), points
+
+    monkeypatch.setattr("vermilion.scan.views.ScanViews.landmarks", landmarks)
+    found = find_landmarks(scan, None, truth)
+    np.testing.assert_allclose(found.points[17:], truth[17:], atol=1e-9)
+
+
+def test_a_face_that_is_seen_only_from_the_side_is_found(generic, monkeypatch):
+    truth = generic.neutral_mm[generic.landmarks]
+    scan = Mesh(generic.neutral_mm, generic.triangles)
+
+    def landmarks(views, camera, detector):
+        front, up = -camera.rotation[2], -camera.rotation[1]
+        if front[2] < 0.9 or up[1] < 0.5 or abs(front[0]) < 0.1:
+            return Landmarks.none(), np.full((66, 3), np.nan)
+        return Landmarks(camera.project(truth), np.full(66, 0.5), True), truth
 
     monkeypatch.setattr("vermilion.scan.views.ScanViews.landmarks", landmarks)
     found = find_landmarks(scan, None, truth)

@@ -12,6 +12,7 @@ from vermilion.correspondence.correspondence import Correspondence
 from vermilion.external.read import read_tracked
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.camera import read_cameras
+from vermilion.scan.landmarks import ScanLandmarks, write_scan_landmarks
 from vermilion.storage.tables import read_table
 
 from .conftest import Project
@@ -109,6 +110,15 @@ def test_flames_weights_are_solved_from_the_parameters_and_the_model(fresh_proje
     assert "apply/s1/phone/flame.npz" in export[1]
 
 
+def by_hand(tracker, neutral_m):
+    """Landmarks at the vertices (V, 3) m that a person would choose: the tiny run's detector, trained on
+    24 small images, is no measure of whether landmarks are found on a mesh."""
+    face = tracker.face
+    places = tracker.sample(face.neutral_mm)
+    nearest = cKDTree(places).query(face.neutral_mm[face.landmarks])[1]
+    return ScanLandmarks(1000.0 * neutral_m[nearest], np.zeros(len(nearest)))
+
+
 @pytest.fixture(scope="module")
 def corrected(finished, tmp_path_factory):
     """The finished tiny capture, run again with a simulated tracker's sequences as its base."""
@@ -135,9 +145,14 @@ def corrected(finished, tmp_path_factory):
         )
     (folder / "tracks/s1_phone" / f"head.{LOST:04d}.obj").unlink()
     sheet.write_text("\n".join(rows) + "\n")
-    project.edit_configuration(
-        lambda content: content["apply"].update(export={"formats": ["usd", "obj"]})
-    )
+    write_scan_landmarks(folder / "tracks/landmarks.tsv", by_hand(tracker, meshes["s1", "rom"][0]))
+
+    def wish(content):
+        content["apply"].update(export={"formats": ["usd", "obj"]})
+        base = {"landmarks": "tracks/landmarks.tsv"}
+        content.setdefault("tracking", {})["external"] = {"base": base}
+
+    project.edit_configuration(wish)
     wanted = ["results/external/apply/s1/phone/corrected.npy"]
     project.snakemake("--rerun-triggers", "mtime", "--forcerun", *ADDED, "--", *wanted)
     return project, tracker, meshes["s1", "phone"]
