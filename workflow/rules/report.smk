@@ -108,6 +108,12 @@ def regressor_rows():
     return rows
 
 
+def applied_kind():
+    """Kind of the regressor that corrected the report's first video (PS, MS, GR); empty where none did."""
+    takes = applied_takes()
+    return apply_regressor(takes[0]).partition("-")[0] if takes and CONFIG.apply.trains else ""
+
+
 rule quality:
     """Joins the flagged frames of every stage: quality.tsv."""
     input:
@@ -185,6 +191,7 @@ rule summary:
             "training",
         ),
         code=code_of("report/summary"),
+        applied=applied_kind(),
         names={
             "maps": [take.name for take in evaluated_takes()],
             "training": regressor_names(),

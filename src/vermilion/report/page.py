@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,7 +15,10 @@ import pandas as pd
 
 from vermilion.storage.errors import InputError
 
-_LARGE_BYTES = 300_000
+#: Smaller image files are embedded as they are.
+_LARGE_BYTES = 60_000
+#: Width of the text, and so of the images as they are shown.
+_SHOWN_PX, _QUALITY = 1032, 82
 _STYLE = """
 :root { --ink: #23211f; --soft: #6d6761; --line: #e4dfd9; --accent: #a63d2f; --paper: #fffdfb; }
 * { box-sizing: border-box; }
@@ -39,24 +43,64 @@ figcaption { color: var(--soft); font-size: 14px; margin-top: 6px; max-width: 74
 .figures div { flex: 1 1 190px; border: 1px solid var(--line); border-radius: 6px; padding: 12px 16px;
   background: #fff; }
 .figures b { font-size: 24px; display: block; } .figures span { color: var(--soft); font-size: 13px; }
+.figures p { margin: 8px 0 0; font-size: 14px; line-height: 1.45; }
 details { margin: 8px 0; } summary { cursor: pointer; color: var(--accent); }
+details.part { margin: 0; border-top: 1px solid var(--line); padding: 2px 0; }
+details.part > summary { padding: 9px 0; } details.part[open] { padding-bottom: 24px; }
+details.part > summary h2 { display: inline; margin: 0; padding: 0; border: 0; font-size: 17px; }
+button { font: inherit; font-size: 14px; padding: 4px 12px; border: 1px solid var(--line);
+  border-radius: 6px; background: #fff; color: var(--accent); cursor: pointer; }
 code { font: 13px/1.5 ui-monospace, Menlo, Consolas, monospace; background: #f5f1ec; padding: 1px 4px; }
 .none { color: var(--soft); }
 """
 
 
-def page(title: str, lead: str, sections: Sequence[tuple[str, str]]) -> str:
-    """A whole page. `sections` are (heading, HTML body) pairs; empty bodies are left out."""
+#: A link to a folded part opens it; so does the button, and printing opens all.
+_UNFOLD = """
+const parts = [...document.querySelectorAll("details.part")];
+const unfold = () => {
+  const wanted = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  if (wanted) { wanted.open = true; wanted.scrollIntoView(); }
+};
+addEventListener("hashchange", unfold); unfold();
+addEventListener("beforeprint", () => parts.forEach((part) => { part.open = true; }));
+document.getElementById("unfold").onclick = () => {
+  const open = !parts.every((part) => part.open);
+  parts.forEach((part) => { part.open = open; });
+};
+"""
+
+
+def page(
+    title: str,
+    lead: str,
+    sections: Sequence[tuple[str, str]],
+    parts: Sequence[tuple[str, str]] = (),
+) -> str:
+    """A whole page. `sections` and the folded `parts` are (heading, HTML body) pairs; empty bodies are left out."""
     kept = [(heading, body) for heading, body in sections if body]
     links = " ".join(f'<a href="#{slug(h)}">{text(h)}</a>' for h, _ in kept)
     bodies = "\n".join(f'<h2 id="{slug(h)}">{text(h)}</h2>\n{body}' for h, body in kept)
+    nav = "" if parts else f"<nav>{links}</nav>\n"  # the folded parts are a list of their own
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{text(title)}</title><style>{_STYLE}</style></head><body><main>\n"
-        f"<h1>{text(title)}</h1><p>{text(lead)}</p>\n<nav>{links}</nav>\n{bodies}\n"
+        f"<h1>{text(title)}</h1><p>{text(lead)}</p>\n{nav}{bodies}\n{_folded_parts(parts)}"
         "</main></body></html>\n"
     )
+
+
+def _folded_parts(parts: Sequence[tuple[str, str]]) -> str:
+    kept = [(heading, body) for heading, body in parts if body]
+    if not kept:
+        return ""
+    folded = "\n".join(
+        f'<details class="part" id="{slug(h)}"><summary><h2>{text(h)}</h2></summary>\n{body}</details>'
+        for h, body in kept
+    )
+    button = '<p><button id="unfold">Open or close all</button></p>'
+    return f'<h2 id="details">Details</h2>\n{button}\n{folded}\n<script>{_UNFOLD}</script>\n'
 
 
 def text(value: object) -> str:
@@ -122,27 +166,36 @@ def table(rows: pd.DataFrame, headings: dict[str, str], group: str | None = None
     )
 
 
-def figures(items: Sequence[tuple[str, str]]) -> str:
-    """A row of large figures: (figure, what it is) pairs."""
-    boxes = "".join(f"<div><b>{text(f)}</b><span>{text(w)}</span></div>" for f, w in items)
+def figures(items: Sequence[tuple[str, ...]]) -> str:
+    """A row of large figures: (figure, what it is), and what a sentence says of it where there is one."""
+    boxes = "".join(
+        f"<div><b>{text(f)}</b><span>{text(w)}</span>{''.join(f'<p>{text(s)}</p>' for s in said)}</div>"
+        for f, w, *said in items
+    )
     return f'<div class="figures">{boxes}</div>' if items else ""
 
 
-def image(path: str | Path, caption: str, width_px: int = 1400) -> str:
-    """A PNG or JPEG, embedded; large ones as JPEG of at most `width_px`."""
+def image(path: str | Path, caption: str, folder: str | Path | None = None) -> str:
+    """An image file, embedded in the size in which it is shown (large ones as WebP).
+
+    Args:
+        folder: that the page lies in: the image leads to its file.
+    """
     path = Path(path)
+    link = None if folder is None else Path(os.path.relpath(path, folder)).as_posix()
     content = path.read_bytes()
     if len(content) <= _LARGE_BYTES:
-        return embedded(content, "png", caption)
+        return embedded(content, "png", caption, link)
     pixels = cv2.imread(str(path))
     if pixels is None:
         raise InputError(
             "a file that is no readable image", "PNG or JPEG", "Remove it and run again.", path=path
         )
-    if pixels.shape[1] > width_px:
-        height = round(pixels.shape[0] * width_px / pixels.shape[1])
-        pixels = cv2.resize(pixels, (width_px, height), interpolation=cv2.INTER_AREA)
-    return embedded(jpeg(pixels[..., ::-1], 84), "jpeg", caption)
+    if pixels.shape[1] > _SHOWN_PX:
+        height = round(pixels.shape[0] * _SHOWN_PX / pixels.shape[1])
+        pixels = cv2.resize(pixels, (_SHOWN_PX, height), interpolation=cv2.INTER_AREA)
+    encoded = cv2.imencode(".webp", pixels, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])[1]
+    return embedded(encoded.tobytes(), "webp", caption, link)
 
 
 def jpeg(pixels: np.ndarray, quality: int) -> bytes:
@@ -151,25 +204,28 @@ def jpeg(pixels: np.ndarray, quality: int) -> bytes:
     return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
-def embedded(content: bytes, kind: str, caption: str) -> str:
-    """The bytes of an image file (`kind` png or jpeg) as a figure."""
+def embedded(content: bytes, kind: str, caption: str, link: str | None = None) -> str:
+    """The bytes of an image file (`kind` png, jpeg or webp) as a figure that leads to `link`."""
     encoded = base64.b64encode(content).decode("ascii")
-    return (
-        f'<figure><img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'
-        f"<figcaption>{text(caption)}</figcaption></figure>"
-    )
+    shown = f'<img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'
+    if link is not None:
+        shown = f'<a href="{text(link)}" title="open the file">{shown}</a>'
+    return f"<figure>{shown}<figcaption>{text(caption)}</figcaption></figure>"
 
 
-def video(path: str | Path, caption: str, limit_mb: float) -> str:
-    """An MP4, embedded up to `limit_mb`, else named."""
+def video(path: str | Path, caption: str, limit_mb: float, folder: str | Path | None = None) -> str:
+    """An MP4, embedded up to `limit_mb`, else named; linked from a page in `folder`."""
     path = Path(path)
+    name = f"<code>{text(path)}</code>"
+    if folder is not None:
+        name = f'<a href="{text(Path(os.path.relpath(path, folder)).as_posix())}">{name}</a>'
     if path.stat().st_size > limit_mb * 1e6:
         size = path.stat().st_size / 1e6
-        return f"<p>{text(caption)}: <code>{text(path)}</code> ({size:.0f} MB, not embedded).</p>"
+        return f"<p>{text(caption)} {name} ({size:.0f} MB, not embedded).</p>"
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return (
-        f'<figure><video controls loop muted src="data:video/mp4;base64,{encoded}"></video>'
-        f"<figcaption>{text(caption)}</figcaption></figure>"
+        f'<figure><video controls autoplay loop muted playsinline src="data:video/mp4;base64,{encoded}">'
+        f"</video><figcaption>{text(caption)} {name}</figcaption></figure>"
     )
 
 

@@ -12,6 +12,7 @@ from vermilion.config.regressors import in_order, is_variant
 from vermilion.report import lips16_sections, page
 from vermilion.report.headline import learning_sentences
 from vermilion.report.how_measured import how_measured
+from vermilion.report.overview import beside, three_figures
 from vermilion.report.table1 import place_of
 
 FRAME_COLUMNS = ("take", "role", "frames", "split", "train", "held_out", "against")
@@ -38,6 +39,7 @@ class SummaryInputs:
     Attributes:
         measures, headline, table1, kinds, flagged: tables.
         comparisons, table2, table3, estimators: tables; configured: the estimator of the configuration.
+        applied: kind of the regressor that corrected the first video, or empty.
         table1_image, figure16: files.
         renders, stretch, error_maps, over_time, curve_images: (name, file) pairs.
         reconstructions: (name, link) pairs, pages on H of a take.
@@ -57,6 +59,7 @@ class SummaryInputs:
     table3: pd.DataFrame
     estimators: pd.DataFrame
     configured: str
+    applied: str
     table1_image: Path
     figure16: Path
     renders: Sequence[tuple[str, Path]]
@@ -73,42 +76,46 @@ class SummaryInputs:
     settings: Sequence[tuple[str, str]]
 
 
-def summary_page(found: SummaryInputs, embed_video_mb: float) -> str:
-    """The page as one string of HTML with everything embedded."""
+def summary_page(found: SummaryInputs, embed_video_mb: float, folder: Path) -> str:
+    """The page in `folder` as one string of HTML with everything embedded."""
     takes = len(found.frames)
     total = int(found.frames["frames"].sum()) if takes else 0
+
+    def images(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
+        return "".join(page.image(path, caption.format(name), folder) for name, path in pairs)
+
+    figures = three_figures(found.headline, found.flagged, total, found.applied)
     return page.page(
         "Lips: what was built and how accurate it is",
-        f"{takes} takes, {total} frames. Everything on this page is also a TSV file beside it.",
+        f"{takes} takes, {total} frames. Every table is also a TSV file beside this page; an image leads to its file.",
+        [
+            ("The video beside its result", beside(found.videos, found.timelines, embed_video_mb, folder)),
+            ("Three figures", page.figures(figures)),
+        ],
         [
             ("What learning brings", _learning(found)),
             ("Key figures", _key_figures(found)),
             ("What the comparisons say", lips16_sections.comparison_section(
                 found.comparisons, found.estimators, found.table1, found.configured)),
-            ("Table 1: tracking error", _table1(found)),
+            ("Table 1: tracking error", _table1(found, folder)),
             ("Tables 2 and 3: influence of the features", lips16_sections.feature_section(found.table2, found.table3)),
             ("RBF network, affine map, kernel regression", lips16_sections.estimator_section(found.estimators)
-             + page.image(found.figure16, _FIGURE16_CAPTION)),
-            ("Corrected takes", _videos(found, embed_video_mb)),
-            ("Renders", _images(found.renders, _RENDER_CAPTION)),
-            ("Surface stretch", _images(found.stretch, _STRETCH_CAPTION)),
-            ("Error maps", _images(found.error_maps, _MAP_CAPTION)),
-            ("Over time", _images(found.over_time, "{}: held-out frames.")),
+             + page.image(found.figure16, _FIGURE16_CAPTION, folder)),
+            ("Renders", images(found.renders, _RENDER_CAPTION)),
+            ("Surface stretch", images(found.stretch, _STRETCH_CAPTION)),
+            ("Error maps", images(found.error_maps, _MAP_CAPTION)),
+            ("Over time", images(found.over_time, "{}: held-out frames.")),
             ("Kinds of mouth shapes", lips16_sections.kinds_section(found.kinds)),
             ("Further measures", _further(found.measures)),
             ("Accuracy of H", _reconstruction(found)),
-            ("Training", _images(found.curve_images, "{}: cross-validation error.")),
+            ("Training", images(found.curve_images, "{}: cross-validation error.")),
             ("Flagged frames", _flagged(found)),
-            ("Images of every stage", _stages(found.overlays)),
+            ("Images of every stage", _stages(found.overlays, folder)),
             ("How this was measured", how_measured(found.frames, found.regressors, found.settings)),
         ],
     )  # fmt: skip
 
 
-_TIMELINE_CAPTION = (
-    "{}: how far each frame lies from what the regressor was trained on, and the limit over which it "
-    "is listed below as outside the training's span; grey frames were not corrected."
-)
 _RENDER_CAPTION = (
     "{}: held-out frames with the largest error of the base track, from front and side: the image, "
     "every regressor, the truth (Lips16 figures 10, 12, 13)."
@@ -128,7 +135,7 @@ _MAP_CAPTION = (
 
 
 def _learning(found: SummaryInputs) -> str:
-    """First lines of the page: what learning brings over a regressor that learnt nothing."""
+    """What learning brings over a regressor that learnt nothing."""
     if found.headline.empty:
         return ""
     sentences = learning_sentences(found.headline, found.comparisons)
@@ -167,7 +174,7 @@ def _key_figures(found: SummaryInputs) -> str:
     return page.figures(items)
 
 
-def _table1(found: SummaryInputs) -> str:
+def _table1(found: SummaryInputs, folder: Path) -> str:
     if found.table1.empty:
         return '<p class="none">No take has held-out frames.</p>'
     rows = found.table1.copy()
@@ -187,7 +194,7 @@ def _table1(found: SummaryInputs) -> str:
     tables = page.table(own, headings, "where")
     if len(own) < len(rows):
         tables += page.folded("With all variants", page.table(rows, headings, "where"))
-    return tables + page.image(found.table1_image, caption)
+    return tables + page.image(found.table1_image, caption, folder)
 
 
 def _further(measures: pd.DataFrame) -> str:
@@ -213,10 +220,6 @@ _NEVER_CLOSED = (
 )
 
 
-def _images(pairs: Sequence[tuple[str, Path]], caption: str) -> str:
-    return "".join(page.image(path, caption.format(name)) for name, path in pairs)
-
-
 def _reconstruction(found: SummaryInputs) -> str:
     links = ", ".join(
         f'<a href="{page.text(link)}">{page.text(name)}</a>' for name, link in found.reconstructions
@@ -236,14 +239,6 @@ def _reconstruction(found: SummaryInputs) -> str:
     )
 
 
-def _videos(found: SummaryInputs, limit_mb: float) -> str:
-    caption = "{}: original, base track, corrected; below, the mouth."
-    videos = "".join(
-        page.video(path, caption.format(name), limit_mb) for name, path in found.videos
-    )
-    return videos + _images(found.timelines, _TIMELINE_CAPTION)
-
-
 def _flagged(found: SummaryInputs) -> str:
     if found.flagged.empty:
         return '<p class="none">None.</p>'
@@ -255,11 +250,11 @@ def _flagged(found: SummaryInputs) -> str:
     return page.table(counts, headings, "stage")
 
 
-def _stages(overlays: Sequence[Overlay]) -> str:
+def _stages(overlays: Sequence[Overlay], folder: Path) -> str:
     body = ""
     for stage in sorted({o.stage for o in overlays}, key=_rank):
         of_stage = [o for o in overlays if o.stage == stage]
-        images = "".join(page.image(o.path, o.what) for o in of_stage)
+        images = "".join(page.image(o.path, o.what, folder) for o in of_stage)
         body += page.folded(f"{stage} ({len(of_stage)})", images)
     return body
 

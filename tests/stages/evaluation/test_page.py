@@ -159,6 +159,7 @@ def write_page(root, ev):
                 "evaluation.measures": {"seed": 0},
                 "training": {"regressor": "kernel"},
             },
+            "applied": "MS",
             "regressors": [
                 {
                     "regressor": "MS",

@@ -49,6 +49,7 @@ def main(snakemake):
         **{name: read_table(inputs[name]) for name in tables},
         flagged=read_table(inputs.quality),
         configured=cfg["training"]["regressor"],
+        applied=snakemake.params.applied,
         table1_image=Path(inputs.image),
         figure16=Path(inputs.figure16),
         renders=named("maps", inputs.renders),
@@ -67,8 +68,9 @@ def main(snakemake):
         regressors=pd.DataFrame(snakemake.params.regressors, columns=list(REGRESSOR_COLUMNS)),
         settings=settings(cfg),
     )
+    folder = Path(snakemake.output.page).parent
     with atomic_path(snakemake.output.page) as temporary:
-        temporary.write_text(summary_page(found, limit_mb), encoding="utf-8")
+        temporary.write_text(summary_page(found, limit_mb, folder), encoding="utf-8")
 
 
 if __name__ == "__main__":
