@@ -82,7 +82,7 @@ clean-intermediate: $(READY)
 PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 
 test: test-quick
-	$(PYTEST) -m slow
+	$(PYTEST) -m slow --durations=30 --durations-min=10
 
 test-quick: setup
 	$(PYTEST) -m "not slow"
