@@ -84,7 +84,7 @@ rule generic:
 
 
 onstart:
-    refuse_stages_in_a_bucket()
+    refuse_in_a_bucket()
     refuse_impossible_jobs()
     cancel_orphaned_jobs()
     prepare_slurm()

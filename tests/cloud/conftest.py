@@ -22,13 +22,16 @@ PACKAGES = Path(os.environ.get("VERMILION_CLOUD", "")).absolute()
 if "VERMILION_CLOUD" not in os.environ:
     collect_ignore_glob = ["test_*.py"]
 PORT, BUCKET = 5055, "facility"
+HERE = Path(__file__).resolve().parent
 
 
 def environment(project: Path) -> dict[str, str]:
     """Of a process that has the project's library and the packages for clouds."""
     paths = os.pathsep.join([str(PACKAGES), str(project / "src")])
+    programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     keys = {"AWS_ACCESS_KEY_ID": "key", "AWS_SECRET_ACCESS_KEY": "secret"}
-    return {**os.environ, **keys, "AWS_DEFAULT_REGION": "us-east-1", "PYTHONPATH": paths}
+    region = {"AWS_DEFAULT_REGION": "us-east-1"}
+    return {**os.environ, **keys, **region, "PYTHONPATH": paths, "PATH": programs}
 
 
 @pytest.fixture
@@ -69,6 +72,23 @@ def storage(address: str, folder: str) -> list[str]:
         *("--storage-s3-endpoint-url", address),
         *("--storage-s3-access-key", "key"),
         *("--storage-s3-secret-key", "secret"),
+    ]
+
+
+@pytest.fixture
+def elsewhere(tmp_path, monkeypatch):
+    """Options by which each job starts in an empty folder, with what it is sent and what it fetches alone.
+
+    The environment of the programs is the only thing that jobs share with the machine that starts them.
+    """
+    machines = tmp_path / "machines"
+    machines.mkdir()
+    monkeypatch.setenv("MACHINES", str(machines))
+    return [
+        *("--executor", "cluster-generic", "--job-deploy-sources", "--jobs", "2"),
+        *("--cluster-generic-submit-cmd", str(HERE / "submit.sh")),
+        *("--cluster-generic-status-cmd", str(HERE / "status.sh")),
+        *("--seconds-between-status-checks", "1"),
     ]
 
 

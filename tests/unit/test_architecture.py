@@ -38,7 +38,7 @@ PACKAGE_OF = {
     "apply": "export",  # applying is correction; what is the stage's own is its files
 }
 #: Rule files that are no stage.
-SHARED_RULES = {"beginning", "common", "paths", "resources", "run", "targets"}
+SHARED_RULES = {"beginning", "bucket", "common", "paths", "resources", "run", "targets"}
 #: Stages that have no section of their own: what they read belongs to another stage's section.
 WITHOUT_SECTION = {
     "scan": "tracking.scans",

@@ -106,6 +106,24 @@ def test_every_rule_has_log_resources_and_fingerprint(path):
             assert "benchmark:" in body, f"{path.name}: {name}"
 
 
+#: Ways to wait for images: in a bucket, each also gives the images themselves.
+WAITS = (
+    "mono_images", "chunk_images", "captured_take", "captured_chunk", "captured_neutral", "window_images",
+    "images_of", "capture_inputs", "landmark_model_inputs", "exports_need",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda p: p.stem)
+def test_a_rule_that_is_told_where_images_lie_finds_them_in_a_bucket_too(path):
+    for body in re.split(r"^ *rule ", path.read_text(), flags=re.MULTILINE)[1:]:
+        name, (inputs, _, rest) = body.partition(":")[0], body.partition(" output:")
+        params = rest.partition(" params:")[2]
+        if re.search(r"^ *source=|\"source\":", params, re.M):
+            assert any(way in inputs for way in WAITS), f"{path.name}: {name}"
+        if "P.manifest" in inputs:
+            assert "captured_take" in inputs, f"{path.name}: {name}"
+
+
 def test_no_function_of_a_rule_file_replaces_another():
     """All rule files share one namespace: the later of two functions of a name serves both."""
     found = [name for path in RULES for name in re.findall(r"^def (\w+)\(", path.read_text(), re.M)]

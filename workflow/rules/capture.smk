@@ -32,7 +32,7 @@ def capture_inputs(wildcards):
     """Images of a chunk that exist, and the calibration; a missing image is the job's to name."""
     take = take_of(wildcards)
     if take.source == STUDIO:
-        return studio_frames(wildcards, wildcards.chunk) + camera_inputs(wildcards)
+        return studio_frames(wildcards, chunk_frames(wildcards)) + camera_inputs(wildcards)
     if is_video(take.source):
         return [take.source]
     files = capture_files(take.source)
@@ -112,6 +112,7 @@ rule cameras:
     input:
         calibration=camera_inputs,
         manifests=per_chunk(P.manifest),
+        images=lambda wildcards: in_bucket(lambda: captured_take(wildcards)),
     output:
         cameras=directory(P.cameras),
         summary=P.calibration,

@@ -60,9 +60,13 @@ CONFIG, TAKES = without_skipped(CONFIG, TAKES)
 
 include: "paths.smk"
 include: "resources.smk"
+include: "bucket.smk"
 
 
 link_to_local_copies(R)
+keep_given_files(R)
+keep_constraints()
+send_with_sources(CONFIG.takes)
 _TAKES = {take.name: take for take in TAKES}
 #: Name of a take -> the row of another tracker's sequence that is its base; empty: our own tracker's is.
 EXTERNAL = sequences_of(TAKES)
@@ -210,20 +214,50 @@ def source_of(wildcards):
     return {"path": take.source, **reading}
 
 
-def mono_patterns(wildcards):
-    """What a job waits for that reads monocular images: manifests, and inpainted frames of a tattoo."""
-    inpainted = take_of(wildcards).role == "tattoo"
-    return [P.manifest, P.inpainted] if inpainted else [P.manifest]
+def images_of(wildcards, names, frames=None):
+    """What a job waits for that opens captured images of a take: the manifests of some of its chunks.
+
+    In a bucket also the studio's images, as nothing else brings them to the job.
+
+    Args:
+        wildcards: of the take, or its row.
+        names: the chunks.
+        frames: those that it opens; None: all of the chunks.
+    """
+    return [fill(P.manifest, wildcards, chunk=name) for name in names] + in_bucket(
+        lambda: studio_images(
+            wildcards, frames or [frame for name in names for frame in frames_in(name)]
+        )
+    )
+
+
+def captured_take(wildcards):
+    """Inputs of a job that opens captured images of a whole take."""
+    return images_of(wildcards, chunks(wildcards))
+
+
+def captured_chunk(wildcards):
+    """Inputs of a job that opens captured images of a chunk."""
+    return images_of(wildcards, [wildcards.chunk])
+
+
+def captured_neutral(wildcards):
+    """Inputs of a job that opens captured images of a take's first frame: the neutral."""
+    return images_of(wildcards, chunks(wildcards)[:1], [first_frame(wildcards)])
 
 
 def mono_images(wildcards):
-    """Inputs of a job that reads the monocular images of a whole take."""
-    return [path for part in mono_patterns(wildcards) for path in of_chunks(part, wildcards)]
+    """Inputs of a job that opens the monocular images of a whole take: inpainted ones of a tattoo."""
+    if take_of(wildcards).role == "tattoo":
+        return of_chunks(P.manifest, wildcards) + of_chunks(P.inpainted, wildcards)
+    return captured_take(wildcards)
 
 
 def chunk_images(wildcards):
-    """Inputs of a job that reads the monocular images of a chunk."""
-    return [fill(part, wildcards, chunk=wildcards.chunk) for part in mono_patterns(wildcards)]
+    """Inputs of a job that opens the monocular images of a chunk."""
+    if take_of(wildcards).role == "tattoo":
+        return [fill(part, wildcards, chunk=wildcards.chunk) for part in (P.manifest, P.inpainted)]
+    return captured_chunk(wildcards)
 
 
 def mono_source(wildcards):

@@ -59,6 +59,7 @@ rule contours:
     input:
         unpack(tracked_lips),
         images=chunk_images,
+        labels=lambda wildcards: in_bucket(lambda: contour_labels(wildcards)),
         landmarks=P.landmarks,
         detector=P.contour_detector,
     output:

@@ -127,7 +127,7 @@ rule guided_refine:
     input:
         unpack(guided_frame),
         corrections=lambda wildcards: person_corrections(wildcards)[wildcards.frame],
-        images=lambda wildcards: fill(P.manifest, wildcards, chunk=chunk_of(wildcards)),
+        images=lambda wildcards: images_of(wildcards, [chunk_of(wildcards)], [int(wildcards.frame)]),
         face=guided_face,
         sequence=guided_chunk,
         cameras=P.cameras,

@@ -17,7 +17,7 @@ rule plain_texture:
         template=P.template,
         neutral=of_plain_take(P.neutral),
         cameras=of_plain_take(P.cameras),
-        manifest=of_plain_take(P.manifest),
+        manifest=lambda wildcards: captured_neutral(plain_take(wildcards)),
     output:
         texture=P.plain_texture,
         overlay=P.plain_texture_overlay,
@@ -45,7 +45,7 @@ rule inpaint_reference:
         plain=P.plain_texture,
         neutral=P.neutral,
         cameras=P.cameras,
-        manifest=first_chunk(P.manifest),
+        manifest=captured_neutral,
     output:
         reference=P.tattoo_reference,
         overlay=P.tattoo_reference_overlay,
@@ -73,7 +73,7 @@ rule inpaint:
         reference=P.tattoo_reference,
         meshes=P.accurate,
         cameras=P.cameras,
-        manifest=P.manifest,
+        manifest=captured_chunk,
     output:
         frames=directory(P.inpainted),
         quality=P.inpaint_quality,

@@ -90,7 +90,7 @@ def landmark_model_inputs(wildcards):
     """Checked frames of the training takes, and their labels."""
     inputs = []
     for take in training_takes():
-        inputs += of_chunks(P.manifest, take) + landmark_label_files(take)
+        inputs += captured_take(take) + landmark_label_files(take)
     return inputs
 
 
@@ -274,7 +274,7 @@ if CONFIG.landmarks.correction.mode == "flow":
 rule landmarks_views:
     """Finds the landmarks of the neutral in every camera of a rig: views_neutral.npz."""
     input:
-        manifest=first_chunk(P.manifest),
+        manifest=captured_neutral,
         cameras=P.cameras,
         detector=detector_files,
     output:

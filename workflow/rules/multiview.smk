@@ -31,12 +31,11 @@ def window_of(wildcards):
     return list(anchor_window(row.first, row.last, size, int(wildcards.clip)))
 
 
-def window_manifests(wildcards):
-    """Manifests of the chunks that hold an anchor's window, and the neutral's."""
+def window_images(wildcards):
+    """Inputs of a job that opens captured images of an anchor's window and of the neutral."""
     wanted = {take_of(wildcards).first, *window_of(wildcards)}
-    files = of_chunks(P.manifest, wildcards)
-    names = chunks(wildcards)
-    return [path for path, name in zip(files, names) if wanted & set(frames_in(name))]
+    names = [name for name in chunks(wildcards) if wanted & set(frames_in(name))]
+    return images_of(wildcards, names, sorted(wanted))
 
 
 def first_take(wildcards):
@@ -55,7 +54,7 @@ def first_neutral(wildcards):
     return {
         "first_neutral": fill(P.neutral, first),
         "first_cameras": fill(P.cameras, first),
-        "first_manifest": of_chunks(P.manifest, first)[0],
+        "first_manifest": captured_neutral(first),
     }
 
 
@@ -79,7 +78,7 @@ rule multiview_neutral:
         template=P.template,
         cameras=P.cameras,
         landmarks=P.views_neutral,
-        manifest=first_chunk(P.manifest),
+        manifest=captured_neutral,
     output:
         neutral=P.neutral,
         cloud=P.neutral_cloud,
@@ -108,7 +107,7 @@ rule multiview_anchor:
         template=P.template,
         cameras=P.cameras,
         neutral=P.neutral,
-        manifests=window_manifests,
+        manifests=window_images,
     output:
         anchor=P.anchor,
     log:
@@ -135,7 +134,7 @@ rule multiview_clip:
         cameras=P.cameras,
         neutral=P.neutral,
         anchors=per_clip(P.anchor, first=1),
-        manifests=per_chunk(P.manifest),
+        manifests=captured_take,
     output:
         clip=P.clip,
     log:
@@ -184,8 +183,8 @@ rule multiview_refine:
         cameras=P.cameras,
         neutral=P.neutral,
         track=P.track,
-        first_manifest=first_chunk(P.manifest),
-        manifest=P.manifest,
+        first_manifest=captured_neutral,
+        manifest=captured_chunk,
     output:
         meshes=P.accurate,
         visibility=P.visibility,
@@ -215,8 +214,8 @@ rule multiview_drift:
         cameras=P.cameras,
         neutral=P.neutral,
         meshes=P.accurate,
-        first_manifest=first_chunk(P.manifest),
-        manifest=P.manifest,
+        first_manifest=captured_neutral,
+        manifest=captured_chunk,
     output:
         drift=P.drift,
     log:
@@ -249,8 +248,10 @@ rule multiview_report:
         template=P.template,
         cameras=P.cameras,
         neutral=P.neutral,
-        first_manifest=first_chunk(P.manifest),
-        manifests=if_tracked(P.manifest),
+        first_manifest=captured_neutral,
+        manifests=lambda wildcards: (
+            captured_take(wildcards) if take_of(wildcards).role == "tattoo" else []
+        ),
         track=if_tracked(P.track),
         meshes=if_tracked(P.accurate),
         visibility=if_tracked(P.visibility),

@@ -122,19 +122,24 @@ def studio_outputs():
     paths = []
     for take in [take for take in TAKES if take.source == STUDIO]:
         for chunk in chunks(take):
-            paths += studio_frames(take, chunk)
+            paths += studio_frames(take, frames_in(chunk))
         paths += studio_cameras(take) + studio_label_files(take)
     return paths
 
 
-def studio_frames(take, chunk):
-    """Images of a chunk of a studio take."""
+def studio_frames(take, frames):
+    """Images of some frames of a studio take."""
     folder = fill(P.capture_folder, take) + "/frames"
     return [
         f"{folder}/{camera}/{frame:06d}.png"
         for camera in camera_names(take_of(take).role)
-        for frame in frames_in(chunk)
+        for frame in frames
     ]
+
+
+def studio_images(take, frames):
+    """Images of some frames of a take of the studio; none of another take."""
+    return studio_frames(take, frames) if take_of(take).source == STUDIO else []
 
 
 for take in [take for take in TAKES if take.source == STUDIO]:
@@ -186,7 +191,7 @@ for take in [take for take in TAKES if take.source == STUDIO]:
                 csv=studio_csv(take),
                 cameras=studio_cameras(take),
             output:
-                studio_frames(take, chunk),
+                studio_frames(take, frames_in(chunk)),
             log:
                 fill(P.log("studio_take", "chunk"), take, chunk=chunk),
             benchmark:
