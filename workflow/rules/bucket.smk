@@ -8,6 +8,8 @@ path, from the container's image or a volume that is mounted for reading.
 
 from snakemake.sourcecache import LocalSourceFile
 
+from vermilion.app.bucket_files import mend_bucket_files
+
 #: Whether the profile stores results in a bucket.
 IN_BUCKET = bool(workflow.storage_settings.default_storage_provider)
 
@@ -36,10 +38,11 @@ def link_to_local_copies(results):
     link.symlink_to(copies.absolute())
 
 
-def keep_given_files(results):
+def prepare_bucket(results):
     """Where results lie in a bucket: all other files of the graph are read where their paths lead."""
     if not IN_BUCKET:
         return
+    mend_bucket_files(workflow.storage_registry.default_storage_provider.get_storage_object_cls())
     modifier = workflow.modifier.path_modifier
     to_bucket = modifier.apply_default_storage
 
@@ -47,18 +50,6 @@ def keep_given_files(results):
         return to_bucket(path) if str(path).startswith(f"{results}/") else path
 
     modifier.apply_default_storage = results_to_bucket
-
-
-def keep_constraints():
-    """Where results lie in a bucket: wildcards in their paths match what the rules allow, as elsewhere.
-
-    Snakemake adds the constraints to the address of an output; the plugin takes the path of the local copy,
-    by which outputs are matched, from the address before that.
-    """
-    if not IN_BUCKET:
-        return
-    provider = workflow.storage_registry.default_storage_provider
-    provider.get_storage_object_cls().local_suffix = lambda it: it.query.partition("://")[2]
 
 
 def send_with_sources(path):

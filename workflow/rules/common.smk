@@ -64,8 +64,7 @@ include: "bucket.smk"
 
 
 link_to_local_copies(R)
-keep_given_files(R)
-keep_constraints()
+prepare_bucket(R)
 send_with_sources(CONFIG.takes)
 _TAKES = {take.name: take for take in TAKES}
 #: Name of a take -> the row of another tracker's sequence that is its base; empty: our own tracker's is.
