@@ -9,8 +9,9 @@ import pytest
 from tests.cloud.conftest import BUCKET, environment, storage
 
 pytestmark = pytest.mark.slow
-#: What no two runs have in common: logs, times and memory of jobs, measured seconds, Snakemake's own time stamps.
-OF_THE_RUN = ("/logs/", "/benchmarks/", "/seconds.tsv", ".snakemake_timestamp")
+#: What two runs have not in common: logs, times and memory of jobs, measured seconds, the ledger of local results,
+#: Snakemake's own time stamps.
+OF_THE_RUN = ("/logs/", "/benchmarks/", "/seconds.tsv", "/checksums.tsv", ".snakemake_timestamp")
 FETCH = """
 import sys
 from pathlib import Path
@@ -84,10 +85,9 @@ def test_captures_of_the_user_are_read_where_they_lie(project, store, elsewhere,
     assert made.returncode == 0, made.stderr[-4000:]
     volume = tmp_path / "volume"
     (project.results / "captures").rename(volume)
-    rows = (project.folder / "config" / "takes.tiny.tsv").read_text().splitlines()
-    (row,) = [line.split("\t") for line in rows if line.startswith("s1\tplain\t")]
-    row[3] = str(volume / "s1" / "plain")
-    (project.folder / "given.tsv").write_text(rows[0] + "\n" + "\t".join(row) + "\n")
+    sheet = (project.folder / "config" / "takes.tiny.tsv").read_text()
+    named = sheet.replace("s1\tplain\tplain\tstudio", f"s1\tplain\tplain\t{volume}/s1/plain")
+    (project.folder / "given.tsv").write_text(named)
     given = ["results=results/given", "takes=given.tsv"]
     target = ["--", "results/given/takes/s1/plain/cameras"]
     there = run(project, *given, *in_bucket(store, "given"), *elsewhere, *target)

@@ -60,7 +60,9 @@ def megapixels_of(take):
 
 def on_slurm():
     """Whether jobs go to Slurm, as is known when the run starts."""
-    return workflow.executor_plugin.name in ("slurm", "cluster-generic")
+    name = workflow.executor_plugin.name
+    submits = getattr(workflow.executor_settings, "submit_cmd", None) or ""
+    return name == "slurm" or (name == "cluster-generic" and "sbatch" in submits)
 
 
 def refuse_impossible_jobs():
