@@ -83,10 +83,10 @@ def make_project(folder: Path, frames: int, chunks: int) -> None:
     (folder / ".venv-mediapipe").symlink_to(ROOT / ".venv-mediapipe")
 
 
-def spent(folder: Path, *options: str) -> tuple[float, float]:
-    """(Seconds, core seconds) of a run of the target `captures` with one core."""
+def spent(folder: Path, *options: str, cores: int = 1) -> tuple[float, float]:
+    """(Seconds, core seconds) of a run of the target `captures` with so many cores."""
     words = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
-    words += ["--configfile", "config.yaml", "--cores", "1", "captures", *options]
+    words += ["--configfile", "config.yaml", "--cores", str(cores), "captures", *options]
     return spent_by(words, folder)
 
 

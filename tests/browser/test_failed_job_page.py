@@ -32,7 +32,7 @@ def test_a_job_that_fails_is_named_with_its_log(page, take):
     page.press("Enter")
     page.tab.wait_for_timeout(2500)
     assert "Done" not in page.text("propagation-text")
-    page.tab.unroute("**/api/status")
+    page.tab.unroute_all(behavior="ignoreErrors")  # an answer may be on its way just now
     page.says("propagation-text", "guided_refine failed")
     page.says("log", "camera other")
     page.screenshot("failed")
