@@ -30,6 +30,18 @@ SIZE = {"width": 1366, "height": 768}
 PATIENCE_MS = 180_000
 
 
+def opened(chromium, file: Path, size_px: tuple[int, int]):
+    """A page from a file in a window of a size, once its video can play; what it said, and which addresses it asked for."""
+    page = chromium.new_page(viewport={"width": size_px[0], "height": size_px[1]})
+    said, asked = [], []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_function("document.querySelector('video').readyState >= 2")
+    return page, said, asked
+
+
 @pytest.fixture(scope="session")
 def chromium():
     """A browser; VERMILION_CHROMIUM names another program than Debian's."""

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.browser.conftest import opened
 from vermilion.imaging.video import write_video
 from vermilion.report.lips_page import TakePage, take_page
 
@@ -36,13 +37,7 @@ def page_file(tmp_path_factory):
 
 @pytest.mark.parametrize("size_px", [(1366, 900), (390, 844)])
 def test_the_video_plays_and_the_time_line_leads_to_its_frames(chromium, page_file, size_px):
-    page = chromium.new_page(viewport={"width": size_px[0], "height": size_px[1]})
-    said, asked = [], []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(page_file.as_uri())
-    page.wait_for_function("document.getElementById('shot').readyState >= 2")
+    page, said, asked = opened(chromium, page_file, size_px)
     width = page.evaluate("document.documentElement.scrollWidth")
     assert width <= size_px[0], "the page is wider than the window"
     assert page.evaluate("document.getElementById('shot').videoWidth") == 160

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.browser.conftest import SCREENSHOTS
+from tests.browser.conftest import SCREENSHOTS, opened
 from vermilion.imaging.video import write_video
 from vermilion.report import page as pieces
 from vermilion.report.overview import beside
@@ -43,13 +43,7 @@ def page_file(tmp_path_factory):
 
 @pytest.mark.parametrize("size_px", [(1366, 768), (390, 844)])
 def test_the_video_comes_first_and_the_rest_is_folded(chromium, page_file, size_px):
-    page = chromium.new_page(viewport={"width": size_px[0], "height": size_px[1]})
-    said, asked = [], []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(page_file.as_uri())
-    page.wait_for_function("document.querySelector('video').readyState >= 2")
+    page, said, asked = opened(chromium, page_file, size_px)
     box = page.locator("video").bounding_box()
     assert box["y"] + box["height"] < size_px[1], "the video is not seen without scrolling"
     assert page.locator("details.part[open]").count() == 0
@@ -66,9 +60,9 @@ def test_the_video_comes_first_and_the_rest_is_folded(chromium, page_file, size_
 
     page.goto("about:blank")
     page.goto(page_file.as_uri() + "#images-of-every-stage")
-    opened = page.locator("details.part[open]")
-    sync_api.expect(opened).to_have_count(1)
-    assert opened.get_attribute("id") == "images-of-every-stage"
+    unfolded = page.locator("details.part[open]")
+    sync_api.expect(unfolded).to_have_count(1)
+    assert unfolded.get_attribute("id") == "images-of-every-stage"
     page.close()
     assert said == []
     local = ("file:", "data:", "about:")
