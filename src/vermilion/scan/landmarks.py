@@ -67,12 +67,9 @@ def find_landmarks(
     views = ScanViews(scan)
     for distance in _DISTANCES:
         for points in _first_looks(views, detector, generic, *distance):
-            for _ in range(2):  # the second time the views are where they should be
-                points, spread = _all_views(views, detector, points, _aligned(points, generic))
-                if _known(points).sum() < LEAST_GIVEN:
-                    break
-            else:
-                return ScanLandmarks(points, spread)
+            found = _from_near(views, detector, generic, points)
+            if found is not None:
+                return found
     raise InputError(
         f"no face in {24 * sum(len(turns) for _, turns in _DISTANCES)} views of the scan",
         "a head or face whose surface the landmark detector knows",
@@ -151,6 +148,18 @@ def _first_looks(
         if away < _LIKE_A_FACE_MM and found.confidence.mean() > 0.75:
             break
     return [points for _, points in sorted(seen, key=lambda entry: entry[0])]
+
+
+def _from_near(
+    views: ScanViews, detector: LandmarkDetector, generic: np.ndarray, points: np.ndarray
+) -> ScanLandmarks | None:
+    """Landmarks from views round a face whose points (66, 3) were seen from afar; None: it is no face."""
+    spread = np.zeros(len(points))
+    for _ in range(2):  # the second time the views are where they should be
+        points, spread = _all_views(views, detector, points, _aligned(points, generic))
+        if _known(points).sum() < LEAST_GIVEN:
+            return None
+    return ScanLandmarks(points, spread)
 
 
 def _known(points: np.ndarray) -> np.ndarray:
