@@ -11,7 +11,7 @@ import numpy as np
 from vermilion.export.animation import Animation
 from vermilion.export.usd_scene import FILM_MM
 from vermilion.geometry.camera import Camera
-from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.vertex_normals import VertexNormals
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_path
 from vermilion.storage.progress import progress
@@ -69,7 +69,8 @@ def _write_samples(schema: Any, animation: Animation) -> None:
     import imath
     from alembic3d import AbcGeom
 
-    polygons, triangles = animation.polygons, animation.polygons.triangles
+    polygons = animation.polygons
+    facing = VertexNormals(polygons.triangles, len(animation.neutral_mm))
     starts = np.cumsum(polygons.counts) - polygons.counts
     owner = np.repeat(np.arange(len(polygons)), polygons.counts)
     # The last corner of a polygon comes first.
@@ -95,7 +96,7 @@ def _write_samples(schema: Any, animation: Animation) -> None:
     for frame in progress(span, "Alembic"):
         last = rows.get(frame, last)
         vertices = np.asarray(animation.vertices_mm[last], np.float64) / animation.unit_mm
-        normals = vertex_normals(vertices, triangles).astype(np.float32)
+        normals = facing.of(vertices).astype(np.float32)
         points = imath.V3fArrayFromBuffer(np.ascontiguousarray(vertices, dtype=np.float32))
         directions = AbcGeom.ON3fGeomParamSample(imath.V3fArrayFromBuffer(normals), scope)
         schema.set(AbcGeom.OPolyMeshSchemaSample(points, corners, counts, uv, directions))

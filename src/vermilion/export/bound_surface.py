@@ -24,7 +24,7 @@ from vermilion.faces.lips import lip_sides_by_distance, triangle_sides
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.cotangents import cotangents
-from vermilion.geometry.deformation_gradients import deformation_gradients
+from vermilion.geometry.gradient_sums import GradientSums, turned_by
 from vermilion.geometry.mesh import Mesh, triangle_normals, vertex_areas, vertex_normals
 from vermilion.geometry.polylines import lengths_along
 from vermilion.geometry.sparse import CholeskyFactor
@@ -53,7 +53,7 @@ _CORNER_MM = 4.0
 _PAIRS, _CONTACT = 64, 1e4
 #: Keeps parts that nothing holds solvable, against the mean stiffness; a hundredth or a hundredfold: nothing at the lips.
 _LEAST_HELD = 1e-8
-_UP = 1
+_UP, _ACROSS = 1, [0, 2]
 
 
 @dataclass(frozen=True)
@@ -80,44 +80,64 @@ class BoundSurface:
             driver: the mesh laid over it (its neutral, V vertices), labelled likewise; the same frame, mm.
         """
         self.rest_mm, self.triangles = labels.neutral_mm, labels.triangles.astype(np.int64)
-        self._driver_rest, self._driver_triangles = driver.neutral_mm, driver.triangles
         own, theirs = (_lip_sides(model) for model in (labels, driver))
         surface = Surface(driver.neutral_mm, driver.triangles)
         sides = triangle_sides(driver.triangles, theirs)
         normals = vertex_normals(self.rest_mm, self.triangles)
-        self._vertices = _bind(surface, self.rest_mm, normals, own, sides)
+        vertices = _bind(surface, self.rest_mm, normals, own, sides)
         centres, facing = (
             self.rest_mm[self.triangles].mean(axis=1),
             triangle_normals(self.rest_mm, self.triangles),
         )
         of_triangles = triangle_sides(self.triangles, own)
-        self._faces = _bind(surface, centres, facing, of_triangles, sides)
-        self._offset = self.rest_mm - self._vertices.points.sample(
-            self._driver_rest, self._driver_triangles
-        )
+        faces = _bind(surface, centres, facing, of_triangles, sides)
         self._driver_pairs, self._pairs = _lip_pairs(driver, labels, own)
-        self._prepare(labels)
+        self._prepare(labels, driver, vertices, faces)
 
-    def _prepare(self, labels: FaceModel) -> None:
+    def _prepare(self, labels: FaceModel, driver: FaceModel, at: Bound, faces: Bound) -> None:
         triangles, n_vertices = self.triangles, len(self.rest_mm)
         ends = np.stack([triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()])
         rows, ones = np.arange(ends.shape[1]), np.ones(ends.shape[1])
         shape = (len(rows), n_vertices)
-        self._edge = sparse.csr_matrix((ones, (rows, ends[0])), shape=shape)
-        self._edge -= sparse.csr_matrix((ones, (rows, ends[1])), shape=shape)
-        self._edges_mm = (self._edge @ self.rest_mm).reshape(-1, 3, 3)
+        edge = sparse.csr_matrix((ones, (rows, ends[0])), shape=shape)
+        edge -= sparse.csr_matrix((ones, (rows, ends[1])), shape=shape)
         inside = labels.regions["mouth_inner"]
         stiff = np.where(inside[triangles].any(axis=1), _INSIDE, 1.0)[:, None]
         weights = sparse.diags_array((stiff * cotangents(self.rest_mm, triangles)).ravel())
-        self._gather = sparse.csr_matrix((weights @ self._edge).T)
-        stiffness = sparse.csc_matrix(self._gather @ self._edge)
+        gather = sparse.csr_matrix((weights @ edge).T)
+        stiffness = sparse.csc_matrix(gather @ edge)
         mean = float(stiffness.diagonal().mean())
         areas = vertex_areas(self.rest_mm, triangles)
-        self._hold = np.maximum(np.where(inside, 0.0, areas / _SCREEN_MM**2), _LEAST_HELD * mean)
-        matrix = sparse.csc_matrix(stiffness + sparse.diags_array(self._hold))
+        hold = np.maximum(np.where(inside, 0.0, areas / _SCREEN_MM**2), _LEAST_HELD * mean)
+        matrix = sparse.csc_matrix(stiffness + sparse.diags_array(hold))
         self._meet = sparse.csr_matrix(_CONTACT * mean * self._pairs.T)
         self._across = CholeskyFactor(matrix)
         self._along = CholeskyFactor(sparse.csc_matrix(matrix + self._meet @ self._pairs))
+        self._right, self._still = self._right_side(driver, (gather, edge), hold, at, faces)
+
+    def _right_side(
+        self, driver: FaceModel, edges: tuple[sparse.csr_matrix, sparse.csr_matrix],
+        hold: np.ndarray, at: Bound, faces: Bound,
+    ) -> tuple[GradientSums, np.ndarray]:  # fmt: skip
+        """The right side as it follows from a pose of the driving mesh, and its constant part (Y, 3).
+
+        `edges` are the weighted sums over edges (Y, E), and the edges (E, Y). With a share less than 1 the rest of a
+        gradient is the identity, and the rest of a place that at rest.
+        """
+        gather, edge = edges
+        count, rest = len(driver.triangles), driver.neutral_mm
+        triangle, share = (np.repeat(values, 3) for values in (faces.points.triangle, faces.share))
+        edges_mm = edge @ self.rest_mm
+        turned = turned_by(triangle, share[:, None] * edges_mm, count)
+        offset = self.rest_mm - at.points.sample(rest, driver.triangles)
+        strength = hold * at.share
+        beside = turned_by(at.points.triangle, strength[:, None] * offset, count)
+        sample = at.points.matrix(driver.triangles, len(rest))
+        sums = GradientSums(
+            rest, driver.triangles, gather @ turned + beside, sparse.diags_array(strength) @ sample
+        )
+        still = gather @ ((1.0 - share)[:, None] * edges_mm)
+        return sums, still + (hold - strength)[:, None] * self.rest_mm
 
     def gaps_mm(self, driver_mm: np.ndarray) -> np.ndarray:
         """Distances (K,) of the lips of a driving mesh driver_mm (V, 3) along the head's up axis."""
@@ -129,16 +149,9 @@ class BoundSurface:
 
     def follow(self, driver_mm: np.ndarray, gaps_mm: np.ndarray) -> np.ndarray:
         """The pose (Y, 3) for driver_mm (V, 3) of the driving mesh, with gaps_mm (K,) between the lips."""
-        gradients = deformation_gradients(self._driver_rest, driver_mm, self._driver_triangles)
-        turned = _blended(gradients, self._faces)
-        wanted = self._edges_mm @ np.swapaxes(turned, 1, 2)
-        at = self._vertices
-        carried = at.points.sample(driver_mm, self._driver_triangles) + np.einsum(
-            "nij,nj->ni", gradients[np.maximum(at.points.triangle, 0)], self._offset
-        )
-        places = self.rest_mm + at.share[:, None] * (carried - self.rest_mm)
-        right = self._gather @ wanted.reshape(-1, 3) + self._hold[:, None] * places
-        pose = self._across.solve(right)
+        right = self._right.of(driver_mm) + self._still
+        pose = np.empty_like(right)
+        pose[:, _ACROSS] = self._across.solve(right[:, _ACROSS])
         pose[:, _UP] = self._along.solve(right[:, [_UP]] + (self._meet @ gaps_mm)[:, None])[:, 0]
         return pose
 
@@ -156,12 +169,6 @@ def _bind(
     distance = np.where(lost, anyhow.distance_mm, found.distance_mm)
     share = np.exp(-((distance / _FADE_MM) ** 2))
     return Bound(SurfacePoints(triangle, barycentric, distance), share)
-
-
-def _blended(gradients: np.ndarray, bound: Bound) -> np.ndarray:
-    """Gradients (N, 3, 3) of bound points, of the driving mesh's (T, 3, 3), fading to the identity."""
-    share = bound.share[:, None, None]
-    return share * gradients[bound.points.triangle] + (1.0 - share) * np.eye(3)
 
 
 def _lip_sides(model: FaceModel) -> np.ndarray:

@@ -20,7 +20,8 @@ from vermilion.export.animation import Animation
 from vermilion.export.shape_basis import ShapeBasis
 from vermilion.export.usd_shapes import continuous_quaternions
 from vermilion.geometry.camera import Camera
-from vermilion.geometry.mesh import normalised, vertex_normals
+from vermilion.geometry.mesh import normalised
+from vermilion.geometry.vertex_normals import VertexNormals
 from vermilion.storage.files import atomic_path
 
 _FLOAT, _UINT = 5126, 5125
@@ -151,9 +152,9 @@ def _material() -> dict[str, Any]:
 
 
 def _mesh(buffer: _Buffer, animation: Animation, basis: ShapeBasis) -> dict[str, Any]:
-    cut, whole = animation.cut_at_seams(), animation.polygons.triangles
-    neutral = basis.neutral_mm.astype(np.float64)
-    normals = vertex_normals(neutral, whole)
+    cut, neutral = animation.cut_at_seams(), basis.neutral_mm.astype(np.float64)
+    facing = VertexNormals(animation.polygons.triangles, len(neutral))
+    normals = facing.of(neutral)
     primitive: dict[str, Any] = {
         "attributes": {
             "POSITION": buffer.add(neutral[cut.source] * _METRES, _ARRAY, bounds=True),
@@ -168,7 +169,7 @@ def _mesh(buffer: _Buffer, animation: Animation, basis: ShapeBasis) -> dict[str,
         primitive["attributes"]["TEXCOORD_0"] = buffer.add(uv, _ARRAY)
     targets = []
     for shape in basis.shapes.shapes_mm:
-        turned = (vertex_normals(neutral + shape, whole) - normals)[cut.source]
+        turned = (facing.of(neutral + shape) - normals)[cut.source]
         targets.append(
             {
                 "POSITION": buffer.add(shape[cut.source] * _METRES, _ARRAY, bounds=True),

@@ -208,8 +208,8 @@ def _error(flat: DiskTable, used: np.ndarray, enough_mm: float) -> float:
     for _, values in flat.read_blocks():
         _centre(values)
         values -= single @ (single.T @ values)
-        np.multiply(values, values, out=values)
-        squared = values.reshape(len(values), -1, 3).sum(axis=2)
+        offsets = values.reshape(len(values), -1, 3)
+        squared = np.einsum("fvc,fvc->fv", offsets, offsets)
         worst = max(worst, float(np.sqrt(squared.max())))
         if worst > enough_mm:
             break

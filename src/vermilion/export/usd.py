@@ -18,7 +18,7 @@ from vermilion.export.usd_scene import (
     set_topology,
     vec3_array,
 )
-from vermilion.geometry.mesh import vertex_normals
+from vermilion.geometry.vertex_normals import VertexNormals
 from vermilion.storage.progress import progress
 
 __all__ = ["CAMERA_PATH", "MESH_PATH", "write_usd"]
@@ -34,7 +34,7 @@ def write_usd(path: str | Path, animation: Animation) -> None:
     Time codes are frame numbers, y is up, lengths are in the animation's unit. Points are those of
     the sequence; a frame without a mesh has no sample.
     """
-    triangles = animation.polygons.triangles
+    facing = VertexNormals(animation.polygons.triangles, len(animation.neutral_mm))
     with new_stage(path, animation) as stage:
         mesh = UsdGeom.Mesh.Define(stage, MESH_PATH)
         set_topology(mesh, animation)
@@ -50,7 +50,7 @@ def write_usd(path: str | Path, animation: Animation) -> None:
             frame = float(animation.frames[row])
             vertices = np.asarray(animation.vertices_mm[row], np.float64) / animation.unit_mm
             points.Set(vec3_array(vertices), frame)
-            normals.Set(vec3_array(vertex_normals(vertices, triangles)), frame)
+            normals.Set(vec3_array(facing.of(vertices)), frame)
             extent.Set(vec3_array(np.stack([vertices.min(axis=0), vertices.max(axis=0)])), frame)
             if done % _FLUSH_FRAMES == 0:
                 stage.GetRootLayer().Save()

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from vermilion.geometry.cotangents import cotangents
-from vermilion.geometry.deformation_gradients import deformation_gradients
+from vermilion.geometry.gradient_sums import GradientSums, turned_by
 from vermilion.geometry.sparse import CholeskyFactor
 
 _HELD, _LOOSE = 1e-2, 1e-8
@@ -39,28 +39,26 @@ class DeformationTransfer:
         held: np.ndarray,
     ):
         """Factor for source_mm and target_mm (V, 3), triangles (T, 3), held (V,)."""
-        self.source_mm = np.asarray(source_mm, dtype=np.float64)
-        self.target_mm = np.asarray(target_mm, dtype=np.float64)
-        self.triangles = triangles
+        source_mm, target_mm = (np.asarray(pose, np.float64) for pose in (source_mm, target_mm))
         ends = np.stack([triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()])
-        edges = np.arange(ends.shape[1])
-        shape = (len(edges), len(self.target_mm))
+        edges, count = np.arange(ends.shape[1]), len(target_mm)
+        shape = (len(edges), count)
         ones = np.ones(len(edges))
-        self._difference = sparse.csr_matrix((ones, (edges, ends[0])), shape=shape)
-        self._difference -= sparse.csr_matrix((ones, (edges, ends[1])), shape=shape)
-        self._weighted = sparse.diags_array(cotangents(self.target_mm, triangles).ravel())
-        self._weighted = (self._weighted @ self._difference).T.tocsr()
-        stiffness = self._weighted @ self._difference
-        self._hold = np.where(held, _HELD, _LOOSE) * stiffness.diagonal().mean()
-        self._factor = CholeskyFactor(sparse.csc_matrix(stiffness + sparse.diags_array(self._hold)))
+        difference = sparse.csr_matrix((ones, (edges, ends[0])), shape=shape)
+        difference -= sparse.csr_matrix((ones, (edges, ends[1])), shape=shape)
+        weighted = sparse.diags_array(cotangents(target_mm, triangles).ravel())
+        weighted = (weighted @ difference).T.tocsr()
+        stiffness = weighted @ difference
+        hold = np.where(held, _HELD, _LOOSE) * stiffness.diagonal().mean()
+        self._factor = CholeskyFactor(sparse.csc_matrix(stiffness + sparse.diags_array(hold)))
+        of_edges = np.repeat(np.arange(len(triangles)), 3)
+        turned = turned_by(of_edges, difference @ target_mm, len(triangles))
+        self._right = GradientSums(
+            source_mm, triangles, weighted @ turned, sparse.diags_array(hold)
+        )
+        self._places = hold[:, None] * (target_mm - source_mm)
 
     def transfer(self, poses_mm: np.ndarray) -> np.ndarray:
         """The target's poses (E, V, 3) mm of the source's poses_mm (E, V, 3)."""
-        gradients = deformation_gradients(self.source_mm, poses_mm, self.triangles)
-        edges = (self._difference @ self.target_mm).reshape(-1, 3, 3)
-        wanted = np.einsum("etij,tkj->tkei", gradients, edges)
-        places = self.target_mm[:, None] + np.swapaxes(poses_mm - self.source_mm, 0, 1)
-        right = self._weighted @ wanted.reshape(len(edges) * 3, -1)
-        right += (self._hold[:, None, None] * places).reshape(len(places), -1)
-        solved = self._factor.solve(right).reshape(len(places), -1, 3)
-        return np.swapaxes(solved, 0, 1)
+        right = [self._right.of(pose) + self._places for pose in poses_mm]
+        return np.stack([self._factor.solve(one) for one in right])
