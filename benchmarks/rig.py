@@ -1,66 +1,198 @@
-"""Weights of a rig for a corrected take: how far the lips are off, with and without the corrective.
+"""Weights of a rig for corrected takes: how far the lips are off, with and without the corrective.
 
-Takes a finished run and one of its corrected takes. The rigs are ARKit's shapes, as `live_link` solves them,
-and the track's own shapes; both are the face model's, not made for the person's corrected lips. Bars: the mean
-over the vermilion at most 0.8 mm, and 0.3 mm with the one corrective shape.
+Takes a finished run and its corrected takes. The rig is ARKit's shapes of the face model, as `live_link` solves them,
+not made for the person's corrected lips. It stands on one neutral after another:
+
+- `tracked`: the face model's, of the tracked identity, which no facility would give its actor;
+- `static`: with what of the correction stands still in the take, as the export has it (`static_correction`);
+- `frame`: the corrected mesh of the frame that shows the neutral (`correction.neutral_frames`), where one is marked;
+- `multi-view`: the neutral **H** of the subject's rig take, which `neutral_pair` has on this mesh;
+- `truth`: the true neutral, of takes whose truth is there in the studio's vertex order.
+
+The last two lie on the take's own mouth by one rigid motion, since they are heads of another size; the rest of the face is the
+tracked one. Prints the distance over the vermilion in mm: mean of all frames (worst frame) of the rig alone; its
+motion, each vertex's mean offset removed; with the corrective; the sum of the weights in the marked frame, which should
+be 0; and the RMS of weights (and of their motion) to those that drove the studio's actor. Bars: 0.8 mm alone on the actor's own neutral, 0.3 mm with the corrective.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.common import add_run_arguments
+from benchmarks.common import add_run_arguments, print_table
 from benchmarks.finished_run import FinishedRun
+from benchmarks.unseen_subject import truth_of
+from vermilion.config.evaluation import ReferenceConfig
+from vermilion.config.face_model import FaceModelConfig
+from vermilion.correction.neutral_pair import NeutralPair
+from vermilion.correspondence.correspondence import Correspondence
+from vermilion.evaluation.reference import MatchTolerance
+from vermilion.export.animation import Animation, HeadFrame, NamedShapes
+from vermilion.export.full_topology import shapes_on_coarse
+from vermilion.export.head_pose import corrected_pose
+from vermilion.export.rig import RigWeights, solve_rig
+from vermilion.export.static_correction import on_own_neutral
+from vermilion.faces.model import FaceModel
+from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.mesh import mesh_corners
+from vermilion.geometry.polygons import Polygons
+from vermilion.storage.errors import VermilionError
+from vermilion.storage.sequences import read_sequence
+
+ALL = "all"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """A finished run and a take."""
-    add_run_arguments(parser, truth=False)
+    add_run_arguments(parser, ALL)
 
 
-def corrected_take(run: FinishedRun):
-    """The corrected take as `apply_export` has it, on the tracker's mesh."""
-    from vermilion.export.animation import Animation, HeadFrame, NamedShapes
-    from vermilion.export.head_pose import corrected_pose
-    from vermilion.geometry.polygons import Polygons
-    from vermilion.storage.sequences import read_sequence
+@dataclass(frozen=True)
+class Scene:
+    """A corrected take as `apply_export` has it, on the tracker's mesh of V vertices.
 
-    face, fit = run.tracker_model(), run.fit()
-    shapes = NamedShapes(face.expression_names, face.expressions_mm, fit.weights)
-    head = HeadFrame(fit.world_from_head_rotation, fit.world_from_head_translation_mm)
-    corrected = read_sequence(run.results / "apply" / run.take / "corrected.npy")
-    take = Animation(
-        fit.frames, 25.0, corrected, Polygons.of_triangles(face.triangles),
-        run.identity().neutral_mm, head, shapes, 1.0,
-    )  # fmt: skip
-    return replace(take, head=corrected_pose(take, face.regions["rigid"]))
+    Attributes:
+        run: where it is.
+        face: the tracker's model.
+        take: the sequence.
+        lips, mask: (V,) bool, the vermilion and what is corrected.
+    """
+
+    run: FinishedRun
+    face: FaceModel
+    take: Animation
+    lips: np.ndarray
+    mask: np.ndarray
+
+    @classmethod
+    def of(cls, run: FinishedRun) -> Scene:
+        """Read it; without a correspondence, the mask is the lips and what is inside."""
+        face, fit = run.tracker_model(), run.fit()
+        shapes = NamedShapes(face.expression_names, face.expressions_mm, fit.weights)
+        head = HeadFrame(fit.world_from_head_rotation, fit.world_from_head_translation_mm)
+        corrected = read_sequence(run.results / "apply" / run.take / "corrected.npy")
+        take = Animation(
+            fit.frames, 25.0, corrected, Polygons.of_triangles(face.triangles),
+            run.identity().neutral_mm, head, shapes, 1.0,
+        )  # fmt: skip
+        take = replace(take, head=corrected_pose(take, face.regions["rigid"]))
+        lips = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
+        mask, path = lips | face.regions["mouth_inner"], run.subject_folder / "correspondence.npz"
+        if path.exists():
+            found = Correspondence.load(path)
+            mask = np.zeros(face.n_vertices, dtype=bool)
+            mask[mesh_corners(found.coarse_triangles, found.mask)] = True
+        return cls(run, face, take, lips, mask)
+
+    def local_mm(self, row: int) -> np.ndarray:
+        """Vertices (V, 3) of a frame in the head frame."""
+        return self.take.head.to_head(row, np.asarray(self.take.vertices_mm[row], np.float64))
+
+    def neutral_row(self) -> int | None:
+        """Row of the marked neutral frame: the one whose coarse mesh its `neutral_pair` holds."""
+        path = self.run.folder / "correction" / "neutral_pair.npz"
+        if not path.exists():
+            return None
+        fit, pair = self.run.fit(), NeutralPair.load(path)
+        head = HeadFrame(fit.world_from_head_rotation, fit.world_from_head_translation_mm)
+        meshes = enumerate(self.run.coarse_mm())
+        away = [np.abs(head.to_head(row, mesh) - pair.coarse_mm).max() for row, mesh in meshes]
+        return int(np.argmin(away))
+
+    def neutrals(self) -> Iterator[tuple[str, np.ndarray]]:
+        """Names and neutrals (V, 3), head frame."""
+        own = on_own_neutral(self.take, self.run.fit().valid).neutral_mm
+        yield "tracked", self.take.neutral_mm
+        yield "static", own
+        row = self.neutral_row()
+        if row is not None:
+            yield "frame", self.local_mm(row)
+        # That of the take itself is the same H, laid on another frame.
+        for path in sorted(self.run.folder.parent.glob("*/correction/neutral_pair.npz"))[:1]:
+            yield "multi-view", self.laid(NeutralPair.load(path).accurate_mm, own)
+        true = self.true_neutral()
+        if true is not None:
+            yield "truth", self.laid(true, own)
+
+    def laid(self, neutral_mm: np.ndarray, own_mm: np.ndarray) -> np.ndarray:
+        """The tracked neutral with the mouth of neutral_mm (V, 3), laid on that of own_mm (V, 3)."""
+        mask = self.mask & np.isfinite(neutral_mm).all(axis=1)
+        move = similarity_alignment(neutral_mm[mask], own_mm[mask], scale=1.0)
+        result = self.take.neutral_mm.astype(np.float64)
+        result[mask] = move.apply(neutral_mm[mask])
+        return result
+
+    def true_weights(self, names: tuple[str, ...]) -> np.ndarray:
+        """Weights (F, K) that drove the actor, of the take's rows; NaN where nobody knows them."""
+        path, rows = self.run.truth / "weights.json", self.take.rows
+        known = json.loads(path.read_text()) if path.exists() else []
+        if len(known) != len(self.take.frames):
+            return np.full((len(rows), len(names)), np.nan)
+        return np.array([[known[row].get(name, 0.0) for name in names] for row in rows])
+
+    def true_neutral(self) -> np.ndarray | None:
+        """The truth's neutral (V, 3) on the tracker's topology, NaN where it has none; None: no truth."""
+        if not (self.run.truth / "neutral_mm.npy").exists():
+            return None
+        near = ReferenceConfig()
+        tolerance = MatchTolerance(near.max_distance_mm, near.max_normal_angle_deg)
+        try:
+            truth = truth_of(self.run, self.take.frames[:1], int(self.take.frames[0]), None)
+            opened = FaceModelConfig().template_slight_open
+            return truth.reference(self.run.model("tracker"), opened, tolerance).rest_mm
+        except VermilionError as error:
+            print(f"no row of the truth: {error}")
+            return None
+
+
+def figures(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray) -> dict[str, float | str]:
+    """A row of the table for a rig that stands on neutral_mm (V, 3)."""
+    take = replace(scene.take, neutral_mm=neutral_mm)
+    found, row = solve_rig(take, rig, scene.lips), scene.neutral_row()
+    result: dict[str, float | str] = {
+        "alone": f"{found.left_mm.mean():.2f} ({found.left_mm.max():.2f})",
+        "motion": _motion_mm(scene, rig, neutral_mm, found),
+        "with corrective": f"{found.corrected_mm.mean():.2f} ({found.corrected_mm.max():.2f})",
+        "shapes used": float((found.alone > 0.01).sum(axis=1).mean()),
+    }
+    if row is not None:
+        result["at neutral"] = float(found.alone[scene.take.rows.index(row)].sum())
+    off = found.alone - scene.true_weights(rig.names)
+    if np.isfinite(off).all():
+        moving = off - off.mean(axis=0)
+        result["weights off"], result["moving"] = (
+            np.sqrt((off**2).mean()),
+            np.sqrt((moving**2).mean()),
+        )
+    return result
+
+
+def _motion_mm(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray, found: RigWeights) -> float:
+    """Distance over the lips of the rig alone, without each vertex's mean offset over the frames."""
+    shapes = np.asarray(rig.shapes_mm, np.float64)[:, scene.lips]
+    lips = np.stack([scene.local_mm(row)[scene.lips] for row in scene.take.rows])
+    left = lips - neutral_mm[scene.lips] - np.tensordot(found.alone, shapes, axes=1)
+    return float(np.linalg.norm(left - left.mean(axis=0), axis=2).mean())
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Print a line a rig."""
-    from vermilion.export.full_topology import shapes_on_coarse
-    from vermilion.export.rig import solve_rig
-    from vermilion.faces.model import FaceModel
-
-    found = FinishedRun.of(arguments)
-    take, face = corrected_take(found), found.tracker_model()
-    lips = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
-    studio = FaceModel.load(found.results / "face_model" / "studio.npz")
-    print(
-        f"{found.take}, {len(take.rows)} frames; mm over the vermilion, mean of all frames (worst frame)"
-    )
-    print("rig               shapes  used    rig alone    with the corrective")
-    rigs = {"ARKit": shapes_on_coarse(studio, face)}
-    if len(take.shapes.names) != len(rigs["ARKit"].names):
-        rigs["the track's own"] = take.shapes
-    for name, rig in rigs.items():
-        solved = solve_rig(take, rig, lips)
-        used = float((solved.alone > 0.01).sum(axis=1).mean())
-        left, after = solved.left_mm, solved.corrected_mm
-        print(
-            f"{name:18} {len(rig.names):5} {used:5.1f} {left.mean():7.3f} ({np.max(left):.3f})"
-            f" {after.mean():9.3f} ({np.max(after):.3f})"
-        )
+    """Print a line a take and neutral."""
+    names, rows = [arguments.take], []
+    if arguments.take == ALL:
+        found = sorted(arguments.results.glob("apply/*/*/corrected.npy"))
+        names = ["/".join(path.parent.parts[-2:]) for path in found]
+    studio = FaceModel.load(arguments.results / "face_model" / "studio.npz")
+    for name in names:
+        scene = Scene.of(FinishedRun.of(argparse.Namespace(**vars(arguments) | {"take": name})))
+        rig = shapes_on_coarse(studio, scene.face)
+        count = len(scene.take.rows)
+        rows += [
+            {"take": name, "frames": count, "neutral": kind, **figures(scene, rig, neutral)}
+            for kind, neutral in scene.neutrals()
+        ]
+    print_table(rows, 2)

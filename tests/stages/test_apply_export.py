@@ -91,7 +91,7 @@ def export(root, out, options, **more):
         "corrected": "corrected.npy", "mesh": "mesh.ply", "weights": "weights.csv",
         "overlay": "overlay.mp4", "timeline": "timeline.png", "full": "full.npy",
         "plate": "plate", "albedo": "albedo.png", "live_link": "live_link.csv", "rig": "rig.csv",
-        "corrective": "rig_corrective.obj", "on_head": "head.npy", "flame": "flame.npz", **FILES,
+        "person": "rig_person.obj", "corrective": "rig_corrective.obj", "on_head": "head.npy", "flame": "flame.npz", **FILES,
     }  # fmt: skip
     run_script(
         "apply/apply_export",
@@ -129,7 +129,7 @@ def test_every_format_of_the_trackers_mesh_is_the_corrected_take(take, tmp_path)
     assert table["Timecode"].iloc[0] == "00:00:00:20.000"
     assert np.all(np.diff(table["JawOpen"]) > 0)
     rig = pd.read_csv(tmp_path / "rig.csv")
-    assert rig.columns.tolist() == ["frame", "time_s", "valid", "open", "corrective"]
+    assert rig.columns.tolist() == ["frame", "time_s", "valid", "open", "person", "corrective"]
     assert read_polygons(tmp_path / "rig_corrective.obj")[0].shape == (tracker.n_vertices, 3)
     texture = cv2.imread(str(tmp_path / "albedo.png"))
     assert texture.shape == (1024, 1024, 3)

@@ -15,6 +15,7 @@ from vermilion.export.head_pose import corrected_pose
 from vermilion.export.live_link import SHAPES, arkit_column, timecode, write_live_link
 from vermilion.export.objs import write_obj
 from vermilion.export.rig import bounded_weights, read_rig, solve_rig
+from vermilion.export.static_correction import on_own_neutral, static_correction
 from vermilion.storage.errors import InputError
 from vermilion.studio.live_link import read_live_link
 
@@ -88,6 +89,44 @@ def test_a_head_that_the_correction_moved_costs_no_weights():
     found = solve_rig(replace(moved, head=pose), own, lips)
     assert found.left_mm.mean() < 0.3
     assert solve_rig(moved, own, lips).left_mm.mean() > 3.0
+
+
+def person_of(head, own):
+    """Lips of a person that the model does not have, which look like the rig's first shape."""
+    near = np.exp(-(head.neutral_mm[:, :2] ** 2).sum(axis=1) / 300)
+    return 0.4 * own.shapes_mm[0] + near[:, None] * [0.0, 0.8, -0.6]
+
+
+def test_a_persons_own_lips_cost_no_weights():
+    true = smooth_weights()
+    head = animated_head(np.arange(COUNT))
+    own = rig(len(head.neutral_mm), head.neutral_mm * [1, 1, 0])
+    person = person_of(head, own)
+    animation, own, lips = shown(true, person)
+    # The track is two frames late: its motion is wrong, its mean expression is not.
+    late = np.concatenate([true[2:], true[:2]])
+    animation = replace(animation, shapes=replace(own, weights=late))
+    assert np.abs(static_correction(animation) - person).max() < 1e-4
+    apart = solve_rig(on_own_neutral(animation), own, lips)
+    assert np.abs(apart.alone - true).mean() < 0.04
+    together = solve_rig(animation, own, lips)
+    assert np.abs(together.alone - true).mean() > 2 * np.abs(apart.alone - true).mean()
+    assert together.left_mm.mean() > 2 * apart.left_mm.mean()
+
+
+def test_frames_that_were_not_corrected_say_nothing_of_the_person():
+    true = smooth_weights()
+    animation, own, _ = shown(true)
+    person = person_of(animation, own)
+    local = animation.neutral_mm + np.tensordot(true, own.shapes_mm, axes=1)
+    valid = np.arange(COUNT) % 3 > 0
+    local[valid] += person
+    world = [animation.head.to_world(row, mesh) for row, mesh in enumerate(local)]
+    animation = replace(
+        animation, vertices_mm=np.stack(world), shapes=replace(own, weights=true)
+    )  # fmt: skip
+    assert np.abs(static_correction(animation, valid) - person).max() < 1e-6
+    assert not static_correction(animation, np.zeros(COUNT, bool)).any()
 
 
 def test_weights_minimise_the_energy_within_their_bounds():

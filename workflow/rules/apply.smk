@@ -63,6 +63,7 @@ def exports_to(folder, overlay, timeline, category):
         outputs["live_link"] = folder + "/live_link.csv"
     if options.rig:
         outputs["rig"] = folder + "/rig.csv"
+        outputs["person"] = folder + "/rig_person.obj"
         outputs["corrective"] = folder + "/rig_corrective.obj"
     if options.flame:
         outputs["flame"] = folder + "/flame.npz"

@@ -74,7 +74,7 @@ class ExportConfig(StageConfig):
         None,
         description="Folder with the blend shapes of your rig: `neutral.obj` and a file a shape, in the "
         "vertex order of the exported mesh (mm). Its weights of the take are written as `rig.csv`, and what "
-        "it cannot show as one more shape, `rig_corrective.obj`.",
+        "it cannot show as two more shapes: `rig_person.obj` (what stands still) and `rig_corrective.obj`.",
     )
     flame: bool = Field(
         False,

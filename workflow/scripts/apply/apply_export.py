@@ -24,6 +24,7 @@ from vermilion.export.packages import write_packages
 from vermilion.export.plates import write_plates
 from vermilion.export.rig import read_rig, solve_rig
 from vermilion.export.shape_basis import shape_basis
+from vermilion.export.static_correction import on_own_neutral
 from vermilion.export.timeline import draw_timeline
 from vermilion.export.weights import write_weights
 from vermilion.external.flame import read_parameters
@@ -124,30 +125,41 @@ def add_images(snakemake, animation, face, other, options):
     return animation
 
 
-def write_rigs(snakemake, options, coarse, animation, face, other):
-    """ARKit's weights of the corrected face, and those of the user's rig with its corrective."""
-    inputs, out, fps = snakemake.input, snakemake.output, snakemake.params.fps
-    if options.live_link:
-        shapes = shapes_on_coarse(FaceModel.load(inputs.studio), face)
-        found = solve_rig(coarse, shapes, lips_of(face))
-        print(f"ARKit: {found.left_mm.mean():.3f} mm off over the lips")
-        rotation = coarse.head.rotation[coarse.rows]
-        write_live_link(out.live_link, found.frames, fps, shapes.names, found.alone, rotation)
-    if options.rig:
-        rig = read_rig(inputs.rig, len(animation.neutral_mm))
-        if inputs.get("head"):  # the rig stands in the unit and frame of the head's file
-            rig = replace(rig, shapes_mm=other.head_from_file.turn(rig.shapes_mm))
-        found = solve_rig(animation, rig, lips_of(face) if other is None else other.lips)
-        print(
-            f"rig: {found.left_mm.mean():.3f} mm off over the lips, {found.corrected_mm.mean():.3f} mm "
-            "with the corrective"
-        )
-        names = [*rig.names, "corrective"]
-        weights = np.column_stack([found.shapes.weights, found.corrective])
-        write_weights(out.rig, found.frames, fps, names, weights, np.ones(len(weights), bool))
-        shown = animation.neutral_mm + found.corrective_mm
-        shown = other.head_from_file.undo(shown) if inputs.get("head") else shown / options.unit_mm
-        write_obj(out.corrective, shown, animation.polygons, animation.uv, animation.uv_corners)
+def write_live_weights(snakemake, coarse, face, valid):
+    """ARKit's weights of the corrected face, without what of its person the model does not show."""
+    shapes = shapes_on_coarse(FaceModel.load(snakemake.input.studio), face)
+    found = solve_rig(on_own_neutral(coarse, valid), shapes, lips_of(face))
+    print(f"ARKit: {found.left_mm.mean():.3f} mm off over the lips, on this person's own neutral")
+    write_live_link(
+        snakemake.output.live_link, found.frames, snakemake.params.fps, shapes.names, found.alone,
+        coarse.head.rotation[coarse.rows],
+    )  # fmt: skip
+
+
+def write_rig(snakemake, options, animation, lips, valid, head):
+    """Weights of the user's rig, with the shapes that it lacks: the person's, and the corrective."""
+    inputs, out = snakemake.input, snakemake.output
+    rig = read_rig(inputs.rig, len(animation.neutral_mm))
+    if head is not None:  # the rig stands in the unit and frame of the head's file
+        rig = replace(rig, shapes_mm=head.head_from_file.turn(rig.shapes_mm))
+    own = on_own_neutral(animation, valid)
+    found = solve_rig(own, rig, lips)
+    static = np.linalg.norm(own.neutral_mm - animation.neutral_mm, axis=1)[lips].mean()
+    print(
+        f"rig: {found.left_mm.mean():.3f} mm off over the lips on this person's own neutral, which is {static:.3f} mm "
+        f"from the tracked one; {found.corrected_mm.mean():.3f} mm with the corrective"
+    )
+    names, weights = [*rig.names, "person", "corrective"], found.shapes.weights
+    table = np.column_stack([weights, np.ones(len(weights)), found.corrective])
+    valid_rows = np.ones(len(table), bool)
+    write_weights(out.rig, found.frames, snakemake.params.fps, names, table, valid_rows)
+    shapes = {
+        out.person: own.neutral_mm,
+        out.corrective: animation.neutral_mm + found.corrective_mm,
+    }
+    for path, shown in shapes.items():
+        shown = shown / options.unit_mm if head is None else head.head_from_file.undo(shown)
+        write_obj(path, shown, animation.polygons, animation.uv, animation.uv_corners)
 
 
 def write_flame(snakemake, coarse, face, placement, origin):
@@ -193,7 +205,12 @@ def main(snakemake):
         animation = on_other_mesh(out.full, coarse, other, "full face")
     elif inputs.get("head"):
         animation, other = on_head(inputs, out, coarse, face, options)
-    write_rigs(snakemake, options, coarse, animation, face, other)
+    if options.live_link:
+        write_live_weights(snakemake, coarse, face, fit.valid)
+    if options.rig:
+        lips = lips_of(face) if other is None else other.lips
+        head = other if inputs.get("head") else None
+        write_rig(snakemake, options, animation, lips, fit.valid, head)
     animation = add_images(snakemake, animation, face, other, options)
     if inputs.get("placement"):
         placement, origin = Placement.load(inputs.placement), Origin.load(inputs.origin)
