@@ -4,14 +4,15 @@ Takes a finished run and its corrected takes. The rig is ARKit's shapes of the f
 not made for the person's corrected lips. It stands on one neutral after another:
 
 - `tracked`: the face model's, of the tracked identity, which no facility would give its actor;
-- `static`: with what of the correction stands still in the take, as the export has it (`static_correction`);
-- `frame`: the corrected mesh of the frame that shows the neutral (`correction.neutral_frames`), where one is marked;
+- `static`: with what of the correction stands still in the take, as the export has it where no neutral frame is marked;
+- `frame`: with the corrected mouth of the frame that shows the neutral (`correction.neutral_frames`), as the export has it
+  where one is marked;
 - `multi-view`: the neutral **H** of the subject's rig take, which `neutral_pair` has on this mesh;
-- `truth`: the true neutral, of takes whose truth is there in the studio's vertex order.
+- `truth`: the true surface where H's neutral lies, of takes with a truth.
 
 The last two lie on the take's own mouth by one rigid motion, since they are heads of another size; the rest of the face is the
 tracked one. Prints the distance over the vermilion in mm: mean of all frames (worst frame) of the rig alone; its
-motion, each vertex's mean offset removed; with the corrective; the sum of the weights in the marked frame, which should
+motion, each vertex's mean offset removed; with the corrective; the sum of the mouth's weights in the marked frame, which should
 be 0; and the RMS of weights (and of their motion) to those that drove the studio's actor. Bars: 0.8 mm alone on the actor's own neutral, 0.3 mm with the corrective.
 """
 
@@ -26,22 +27,19 @@ import numpy as np
 
 from benchmarks.common import add_run_arguments, print_table
 from benchmarks.finished_run import FinishedRun
-from benchmarks.unseen_subject import truth_of
-from vermilion.config.evaluation import ReferenceConfig
-from vermilion.config.face_model import FaceModelConfig
 from vermilion.correction.neutral_pair import NeutralPair
 from vermilion.correspondence.correspondence import Correspondence
-from vermilion.evaluation.reference import MatchTolerance
 from vermilion.export.animation import Animation, HeadFrame, NamedShapes
 from vermilion.export.full_topology import shapes_on_coarse
 from vermilion.export.head_pose import corrected_pose
 from vermilion.export.rig import RigWeights, solve_rig
-from vermilion.export.static_correction import on_own_neutral
+from vermilion.export.static_correction import moves_lips, on_own_neutral
 from vermilion.faces.model import FaceModel
 from vermilion.geometry.alignment import similarity_alignment
+from vermilion.geometry.closest_points import Surface
 from vermilion.geometry.mesh import mesh_corners
 from vermilion.geometry.polygons import Polygons
-from vermilion.storage.errors import VermilionError
+from vermilion.multiview.files import read_neutral
 from vermilion.storage.sequences import read_sequence
 
 ALL = "all"
@@ -106,12 +104,14 @@ class Scene:
 
     def neutrals(self) -> Iterator[tuple[str, np.ndarray]]:
         """Names and neutrals (V, 3), head frame."""
-        own = on_own_neutral(self.take, self.run.fit().valid).neutral_mm
+        valid = self.run.fit().valid
+        own = on_own_neutral(self.take, self.lips, valid).neutral_mm
         yield "tracked", self.take.neutral_mm
         yield "static", own
         row = self.neutral_row()
         if row is not None:
-            yield "frame", self.local_mm(row)
+            frame = int(self.take.frames[row])
+            yield "frame", on_own_neutral(self.take, self.lips, valid, frame).neutral_mm
         # That of the take itself is the same H, laid on another frame.
         for path in sorted(self.run.folder.parent.glob("*/correction/neutral_pair.npz"))[:1]:
             yield "multi-view", self.laid(NeutralPair.load(path).accurate_mm, own)
@@ -136,18 +136,23 @@ class Scene:
         return np.array([[known[row].get(name, 0.0) for name in names] for row in rows])
 
     def true_neutral(self) -> np.ndarray | None:
-        """The truth's neutral (V, 3) on the tracker's topology, NaN where it has none; None: no truth."""
-        if not (self.run.truth / "neutral_mm.npy").exists():
-            return None
-        near = ReferenceConfig()
-        tolerance = MatchTolerance(near.max_distance_mm, near.max_normal_angle_deg)
-        try:
-            truth = truth_of(self.run, self.take.frames[:1], int(self.take.frames[0]), None)
-            opened = FaceModelConfig().template_slight_open
-            return truth.reference(self.run.model("tracker"), opened, tolerance).rest_mm
-        except VermilionError as error:
-            print(f"no row of the truth: {error}")
-            return None
+        """The truth's points nearest to H's neutral, (V, 3) on this mesh, NaN where H has none; None: no truth."""
+        path = self.run.subject_folder / "correspondence.npz"
+        for sequence in (
+            sorted(self.run.folder.parent.glob("*/multiview/H")) if path.exists() else ()
+        ):
+            multiview, truth = sequence.parent, self.run.truth.parent / sequence.parts[-3]
+            if (truth / "vertices_mm.npy").exists():
+                count = self.run.model("template").n_vertices
+                neutral = read_neutral(multiview / "neutral.npz", count)
+                points = Correspondence.load(path).on_coarse(neutral)
+                known = np.isfinite(points).all(axis=1)
+                mesh = np.load(truth / "vertices_mm.npy", mmap_mode="r")[0].astype(np.float64)
+                triangles = np.load(truth / "triangles.npy")
+                near = Surface(mesh, triangles).closest(points[known])
+                points[known] = near.sample(mesh, triangles)
+                return points
+        return None
 
 
 def figures(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray) -> dict[str, float | str]:
@@ -161,7 +166,8 @@ def figures(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray) -> dict[str,
         "shapes used": float((found.alone > 0.01).sum(axis=1).mean()),
     }
     if row is not None:
-        result["at neutral"] = float(found.alone[scene.take.rows.index(row)].sum())
+        mouth = moves_lips(rig.shapes_mm, scene.lips)
+        result["at rest"] = float(found.alone[scene.take.rows.index(row), mouth].sum())
     off = found.alone - scene.true_weights(rig.names)
     if np.isfinite(off).all():
         moving = off - off.mean(axis=0)

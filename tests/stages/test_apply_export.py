@@ -98,7 +98,7 @@ def export(root, out, options, **more):
         wildcards={"subject": "s1", "take": "t"},
         params={
             "cfg": {"apply.export": options.model_dump()}, "fps": 25.0,
-            "source": str(root / "images"),
+            "source": str(root / "images"), "neutral": None,
         },
         input={
             **{name: root / f"{name}.npz" for name in ("tracker", "studio", "fit", "identity")},

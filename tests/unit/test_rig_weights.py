@@ -107,11 +107,37 @@ def test_a_persons_own_lips_cost_no_weights():
     late = np.concatenate([true[2:], true[:2]])
     animation = replace(animation, shapes=replace(own, weights=late))
     assert np.abs(static_correction(animation) - person).max() < 1e-4
-    apart = solve_rig(on_own_neutral(animation), own, lips)
+    apart = solve_rig(on_own_neutral(animation, lips), own, lips)
     assert np.abs(apart.alone - true).mean() < 0.04
     together = solve_rig(animation, own, lips)
     assert np.abs(together.alone - true).mean() > 2 * np.abs(apart.alone - true).mean()
     assert together.left_mm.mean() > 2 * apart.left_mm.mean()
+
+
+def test_a_rig_is_at_rest_in_the_frame_that_shows_the_neutral():
+    true = smooth_weights()
+    true[7] = 0.0
+    head = animated_head(np.arange(COUNT))
+    own = rig(len(head.neutral_mm), head.neutral_mm * [1, 1, 0])
+    person = person_of(head, own)
+    animation, own, lips = shown(true, person)
+    # The track takes the person for an expression, and blinks.
+    blink = np.zeros((1, len(lips), 3))
+    blink[0, np.linalg.norm(head.neutral_mm - [30.0, 40.0, 0.0], axis=1) < 12] = [0.0, -4.0, 0.0]
+    track = NamedShapes(
+        (*own.names, "blink"), np.concatenate([own.shapes_mm, blink]),
+        np.column_stack([np.clip(true + 0.2, 0, 1), np.ones(COUNT)]),
+    )  # fmt: skip
+    world = [
+        animation.head.to_world(row, animation.head.to_head(row, mesh) + blink[0])
+        for row, mesh in enumerate(animation.vertices_mm)
+    ]
+    animation = replace(animation, shapes=track, vertices_mm=np.stack(world))
+    found = on_own_neutral(animation, lips, neutral_frame=7)
+    assert np.abs(found.neutral_mm - animation.neutral_mm - person).max() < 1e-4
+    assert solve_rig(found, own, lips).alone[7].max() < 0.1
+    lost = on_own_neutral(animation, lips, np.arange(COUNT) != 7, neutral_frame=7)
+    assert np.abs(lost.neutral_mm - found.neutral_mm).max() > 0.1
 
 
 def test_frames_that_were_not_corrected_say_nothing_of_the_person():

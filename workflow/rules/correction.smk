@@ -41,6 +41,13 @@ def neutral_frame(wildcards):
     return CONFIG.correction.neutral_frames.get(take.name, take.first)
 
 
+def rest_frame(wildcards):
+    """Frame of a take that is known to show the neutral; None: of this video nobody said so."""
+    take = take_of(wildcards)
+    first = take.first if take.role == "tattoo" else None
+    return CONFIG.correction.neutral_frames.get(take.name, first)
+
+
 def neutral_of_take(wildcards):
     """The neutral pair of a video that has a neutral frame (use with `unpack`)."""
     marked = take_of(wildcards).name in CONFIG.correction.neutral_frames

@@ -238,6 +238,7 @@ rule guided_export:
         cfg=cfg_of("apply.export"),
         code=code_of("apply/apply_export"),
         fps=take_fps,
+        neutral=rest_frame,
         source=mono_source,
     script:
         "../scripts/apply/apply_export.py"

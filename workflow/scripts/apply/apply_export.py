@@ -128,7 +128,8 @@ def add_images(snakemake, animation, face, other, options):
 def write_live_weights(snakemake, coarse, face, valid):
     """ARKit's weights of the corrected face, without what of its person the model does not show."""
     shapes = shapes_on_coarse(FaceModel.load(snakemake.input.studio), face)
-    found = solve_rig(on_own_neutral(coarse, valid), shapes, lips_of(face))
+    lips, neutral = lips_of(face), snakemake.params.neutral
+    found = solve_rig(on_own_neutral(coarse, lips, valid, neutral), shapes, lips)
     print(f"ARKit: {found.left_mm.mean():.3f} mm off over the lips, on this person's own neutral")
     write_live_link(
         snakemake.output.live_link, found.frames, snakemake.params.fps, shapes.names, found.alone,
@@ -142,7 +143,7 @@ def write_rig(snakemake, options, animation, lips, valid, head):
     rig = read_rig(inputs.rig, len(animation.neutral_mm))
     if head is not None:  # the rig stands in the unit and frame of the head's file
         rig = replace(rig, shapes_mm=head.head_from_file.turn(rig.shapes_mm))
-    own = on_own_neutral(animation, valid)
+    own = on_own_neutral(animation, lips, valid, snakemake.params.neutral)
     found = solve_rig(own, rig, lips)
     static = np.linalg.norm(own.neutral_mm - animation.neutral_mm, axis=1)[lips].mean()
     print(
