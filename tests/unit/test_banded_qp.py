@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from vermilion.export.smoothed_gram import SmoothedGram
-from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, FrameMatrix, solve_in_box
 
 
 def dense(blocks, second, first):
@@ -49,6 +49,18 @@ def test_the_box_holds_and_the_minimum_is_scipys(seed):
     ).x.reshape(right.shape)
     assert found.min() >= 0 and found.max() <= 0.4
     assert np.allclose(found, wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("bound", [0.05, 9.0])
+def test_the_matrix_of_one_frame_is_the_band_of_one_block(bound):
+    band, block, right = problem(1, p=7)
+    frame = FrameMatrix(block)
+    assert np.allclose(frame.times(right), band.times(right), atol=1e-12)
+    free = np.arange(7)[None] % 3 > 0
+    assert np.allclose(frame.solve_free(right, free), band.solve_free(right, free), atol=1e-10)
+    assert not frame.solve_free(right, np.zeros_like(free)).any()
+    wanted = solve_in_box(band, right, -bound, bound)
+    assert np.allclose(solve_in_box(frame, right, -bound, bound), wanted, atol=1e-9)
 
 
 def test_an_infinite_box_is_no_box():

@@ -25,7 +25,7 @@ from vermilion.geometry.rotations import cross_matrix, left_jacobian, rotation_m
 from vermilion.imaging.display import display_slope, to_display_values
 from vermilion.tracking.image_fit.image_levels import PyramidLevel
 from vermilion.tracking.image_fit.landmark_term import LandmarkTerm
-from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.banded_qp import FrameMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.expression import N_POSE
 from vermilion.tracking.landmark_fit.observation import project, projection_jacobian
 
@@ -135,20 +135,14 @@ class FrameProblem:
     def solve(self, view: FrameView) -> FrameFit:
         """The frame's solution, coarse to fine from the landmark fit."""
         x, counts = view.start, self.settings.iterations
-        none = np.zeros((0, len(x)))
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
             # Coarse images need fewer samples.
             part = self._exposed(self._visible(view, 2**level), x, view, level)
             cost, errors = self._cost(x, view, level, part)
             for _ in range(count):
                 matrix, right = self._normal_equations(x, view, level, part, errors)
-                target = solve_in_box(
-                    BandMatrix(matrix[None], none, none),
-                    right[None],
-                    self.lower,
-                    self.upper,
-                    x[None],
-                )[0]
+                program = FrameMatrix(matrix)
+                target = solve_in_box(program, right[None], self.lower, self.upper, x[None])[0]
                 for scale in (1.0, 0.5, 0.25):
                     trial = x + scale * (target - x)
                     trial_cost, trial_errors = self._cost(trial, view, level, part)

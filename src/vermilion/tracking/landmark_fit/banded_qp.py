@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg import solve, solveh_banded
 
 
 class ProgramMatrix(Protocol):
@@ -21,6 +21,29 @@ class ProgramMatrix(Protocol):
 
     def solve_free(self, right: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Solution (F, P) for `right` (F, P) over the `free` (F, P) bool unknowns, the others zero."""
+
+
+class FrameMatrix:
+    """The matrix of a single frame, stored in full: a band of one block is slower.
+
+    Args:
+        block: (P, P) symmetric, positive definite.
+    """
+
+    def __init__(self, block: np.ndarray):
+        self.block = block
+
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Product (1, P) with x (1, P)."""
+        return x @ self.block
+
+    def solve_free(self, right: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Solution (1, P) for `right` (1, P) over the `free` (1, P) bool unknowns, the others zero."""
+        solution, ids = np.zeros_like(right), np.flatnonzero(free[0])
+        if len(ids):
+            part = self.block[np.ix_(ids, ids)]
+            solution[0, ids] = solve(part, right[0, ids], assume_a="pos", check_finite=False)
+        return solution
 
 
 class BandMatrix:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vermilion.tracking.landmark_fit.banded_qp import BandMatrix, solve_in_box
+from vermilion.tracking.landmark_fit.banded_qp import FrameMatrix, solve_in_box
 from vermilion.tracking.landmark_fit.observation import Observations
 from vermilion.tracking.landmark_fit.pose import scaled_orthographic_pose
 from vermilion.tracking.landmark_fit.shape import LandmarkShape
@@ -35,7 +35,6 @@ def first_guess(
     trust = seen.trust / sigma**2
     trust[:, seen.landmark_set.jaw] = 0.0  # a silhouette: no fixed points
     weights = np.zeros((n_frames, n_weights))
-    none = np.zeros((0, n_weights))
     for _ in range(rounds):
         rotation, scale, centre = scaled_orthographic_pose(shape.points(weights), seen.image, trust)
         basis = np.einsum("fij,knj->fnik", rotation[:, :2], shape.expressions_mm)
@@ -45,7 +44,7 @@ def first_guess(
         blocks += np.eye(n_weights) / weight_sigma**2
         right = np.einsum("fn,fnik,fni->fk", trust, basis, target, optimize=True)
         for frame in range(n_frames):
-            matrix = BandMatrix(blocks[frame][None], none, none)
+            matrix = FrameMatrix(blocks[frame])
             weights[frame] = solve_in_box(matrix, right[frame][None], 0.0, 1.0)[0]
     # The scale holds at the depth of the points' mean, not of the head's origin.
     share = (trust / trust.sum(axis=1, keepdims=True))[..., None]
