@@ -33,7 +33,8 @@ install() {
     if command -v uv >/dev/null; then
         uv pip install --python "$venv/bin/python" --quiet "$@"
     else
-        "$venv/bin/python" -m pip install --quiet --use-pep517 --disable-pip-version-check --no-input "$@"
+        # As uv does: each module is compiled at its first import, most of them never.
+        "$venv/bin/python" -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check --no-input "$@"
     fi
 }
 
