@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from vermilion.report.overview import shown_regressor, three_figures
+from vermilion.report.overview import beside, shown_regressor, three_figures
 
 FLAGGED = pd.DataFrame(
     [
@@ -53,3 +53,16 @@ def test_without_anything_measured_only_the_frames_are_told():
     assert [what for _, what, _ in three_figures(nothing, FLAGGED, 20, "MS")] == [
         "of the frames were used by every stage"
     ]
+
+
+def test_the_page_does_not_tell_where_the_results_lie(tmp_path):
+    pages = []
+    for machine in ("here", "bucket/project"):
+        video = tmp_path / machine / "demo/apply/ana/phone/overlay.mp4"
+        video.parent.mkdir(parents=True)
+        video.write_bytes(bytes(2000))
+        pages.append(
+            beside([("ana/phone", video)], [], 0.001, tmp_path / machine / "demo/evaluation")
+        )
+    assert pages[0] == pages[1]
+    assert 'href="../apply/ana/phone/overlay.mp4"><code>apply/ana/phone/overlay.mp4<' in pages[0]

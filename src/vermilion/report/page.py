@@ -218,7 +218,10 @@ def video(path: str | Path, caption: str, limit_mb: float, folder: str | Path | 
     path = Path(path)
     name = f"<code>{text(path)}</code>"
     if folder is not None:
-        name = f'<a href="{text(Path(os.path.relpath(path, folder)).as_posix())}">{name}</a>'
+        # Named as in the results: where these lie is another place on each machine.
+        there = Path(os.path.relpath(path, folder))
+        within = Path(*(part for part in there.parts if part != ".."))
+        name = f'<a href="{text(there.as_posix())}"><code>{text(within.as_posix())}</code></a>'
     if path.stat().st_size > limit_mb * 1e6:
         size = path.stat().st_size / 1e6
         return f"<p>{text(caption)} {name} ({size:.0f} MB, not embedded).</p>"
