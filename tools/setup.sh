@@ -33,7 +33,6 @@ install() {
     if command -v uv >/dev/null; then
         uv pip install --python "$venv/bin/python" --quiet "$@"
     else
-        # As uv does: each module is compiled at its first import, most of them never.
         "$venv/bin/python" -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check --no-input "$@"
     fi
 }
@@ -54,3 +53,7 @@ fi
     install_packages libgl1 libglu1-mesa libopengl0 libegl1
     "$venv/bin/python" -c 'import pymeshlab'
 }
+
+# Compiled by all cores at once, our own modules as well: a run has a process for each job, and where
+# PYTHONDONTWRITEBYTECODE is set, as in many containers, each of them would compile all that it reads.
+"$venv/bin/python" -m compileall -q -j 0 "$venv/lib" src >/dev/null 2>&1 || true

@@ -31,7 +31,7 @@ echo "setup: the landmark network in $venv (half a minute)"
 rm -rf "$venv" "$venv.unavailable"
 "$python" -m venv "$venv" || unavailable "'$python -m venv $venv' failed."
 # --no-deps: mediapipe declares jax and others, which its face mesh does not import.
-"$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --no-input --no-deps \
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input --no-deps \
     --only-binary :all: --require-hashes -r "$lock" >"$venv/install.log" 2>&1 || {
     reason=$(grep -m 1 '^ERROR' "$venv/install.log" || tail -n 1 "$venv/install.log")
     unavailable "its packages could not be installed ($reason)."

@@ -24,6 +24,7 @@ _MARK = "# written by Vermilion's tests"
 _FOLDER = Path("/etc/slurm")
 #: One cluster at a time: they would have the same ports.
 _LOCK = Path("/var/lock/vermilion-test-slurm")
+_MUNGE = Path("/run/munge")
 _CONFIGURATION = """{mark}
 ClusterName=vermilion
 SlurmctldHost={host}(127.0.0.1)
@@ -99,7 +100,7 @@ class Cluster:
         (_FOLDER / "slurm.conf").write_text(text, encoding="utf-8")
         # This plugin starts without touching a mount; neither jobs nor tasks use control groups here.
         (_FOLDER / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n", encoding="utf-8")
-        self._start_munge()
+        self._munge = self._start_munge()
         if self.accounting:
             self.accounting.__enter__()
             self.accounting.register("vermilion")
@@ -114,6 +115,8 @@ class Cluster:
             self._stop(self.run / f"{name}.pid")
         if self.accounting:
             self.accounting.__exit__()
+        if self._munge:
+            self._stop(_MUNGE / "munged.pid")
         (_FOLDER / "slurm.conf").unlink(missing_ok=True)
         (_FOLDER / "cgroup.conf").unlink(missing_ok=True)
         self._lock.close()
@@ -189,14 +192,16 @@ class Cluster:
         return listing.stdout.split()
 
     @staticmethod
-    def _start_munge() -> None:
+    def _start_munge() -> bool:
+        """Start munge where none runs; whether it was started."""
         if subprocess.run(["munge", "-n"], capture_output=True).returncode == 0:
-            return
-        Path("/run/munge").mkdir(exist_ok=True)
-        shutil.chown("/run/munge", "munge")
+            return False
+        _MUNGE.mkdir(exist_ok=True)
+        shutil.chown(_MUNGE, "munge")
         subprocess.run(
             ["runuser", "-u", "munge", "--", shutil.which("munged") or "munged"], check=True
         )
+        return True
 
     def _wait(self, holds, what: str, seconds: float = 30.0) -> None:
         end = time.monotonic() + seconds
