@@ -12,7 +12,7 @@ not made for the person's corrected lips. It stands on one neutral after another
 
 The last two lie on the take's own mouth by one rigid motion, since they are heads of another size; the rest of the face is the
 tracked one. Prints the distance over the vermilion in mm: mean of all frames (worst frame) of the rig alone; its
-motion, each vertex's mean offset removed; with the corrective; the sum of the mouth's weights in the marked frame, which should
+motion, each vertex's mean offset removed; of the neutral alone, with all weights 0 (`null`); with the corrective; the sum of the mouth's weights in the marked frame, which should
 be 0; and the RMS of weights (and of their motion) to those that drove the studio's actor. Bars: 0.8 mm alone on the actor's own neutral, 0.3 mm with the corrective.
 """
 
@@ -162,6 +162,7 @@ def figures(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray) -> dict[str,
     result: dict[str, float | str] = {
         "alone": f"{found.left_mm.mean():.2f} ({found.left_mm.max():.2f})",
         "motion": _motion_mm(scene, rig, neutral_mm, found),
+        "null": float(np.linalg.norm(_from_neutral(scene, neutral_mm), axis=2).mean()),
         "with corrective": f"{found.corrected_mm.mean():.2f} ({found.corrected_mm.max():.2f})",
         "shapes used": float((found.alone > 0.01).sum(axis=1).mean()),
     }
@@ -181,9 +182,14 @@ def figures(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray) -> dict[str,
 def _motion_mm(scene: Scene, rig: NamedShapes, neutral_mm: np.ndarray, found: RigWeights) -> float:
     """Distance over the lips of the rig alone, without each vertex's mean offset over the frames."""
     shapes = np.asarray(rig.shapes_mm, np.float64)[:, scene.lips]
-    lips = np.stack([scene.local_mm(row)[scene.lips] for row in scene.take.rows])
-    left = lips - neutral_mm[scene.lips] - np.tensordot(found.alone, shapes, axes=1)
+    left = _from_neutral(scene, neutral_mm) - np.tensordot(found.alone, shapes, axes=1)
     return float(np.linalg.norm(left - left.mean(axis=0), axis=2).mean())
+
+
+def _from_neutral(scene: Scene, neutral_mm: np.ndarray) -> np.ndarray:
+    """Offsets (F, L, 3) of the lips' L vertices from neutral_mm (V, 3), head frame, mm."""
+    lips = np.stack([scene.local_mm(row)[scene.lips] for row in scene.take.rows])
+    return lips - neutral_mm[scene.lips]
 
 
 def run(arguments: argparse.Namespace) -> None:
