@@ -1,8 +1,10 @@
 #!/bin/sh
 # Make the virtual environment $1; $2 is the Python to use. Versions are those of the lock file; with
 # `latest` as $3, the newest that pyproject.toml allows.
-# uv installs where it is at hand, else pip; both read their own settings (proxy, index, a folder of
-# wheels: PIP_NO_INDEX=1 PIP_FIND_LINKS=folder, or UV_NO_INDEX=1 UV_FIND_LINKS=folder).
+# uv installs where it is at hand; it reads its own settings (UV_NO_INDEX=1 UV_FIND_LINKS=folder of wheels).
+# Elsewhere uv is fetched for the time of the set-up: pip looks at every file that an index has of every
+# package, and takes four times as long. Where pip has an index, a proxy or a folder of wheels of its own
+# (PIP_NO_INDEX=1 PIP_FIND_LINKS=folder), or uv cannot be fetched or fails, pip installs.
 # On Debian and Ubuntu, system packages that are missing are installed (as root or through sudo).
 set -eu
 venv=$1
@@ -29,16 +31,40 @@ command -v "$python" >/dev/null || install_packages python3 python3-venv
 "$python" -c 'import ensurepip, venv' 2>/dev/null ||
     install_packages "python$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')-venv"
 
+has_settings() {
+    "$venv/bin/python" -m pip config list 2>/dev/null |
+        grep -Eq '\.(index-url|no-index|proxy|client-cert|trusted-host)='
+}
+
+fetch_uv() {
+    "$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check --no-input --no-deps \
+        --only-binary :all: --require-hashes --retries 1 --target "$venv/uv" \
+        -r "$(dirname "$0")/../requirements.uv.lock" >/dev/null 2>&1
+}
+
+# `only`: uv is the user's own, and there is no other way; `first`: it was fetched, and pip follows.
 install() {
-    if command -v uv >/dev/null; then
+    if [ "$uv" = only ]; then
         uv pip install --python "$venv/bin/python" --quiet "$@"
-    else
-        "$venv/bin/python" -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check --no-input "$@"
+        return
     fi
+    if [ "$uv" = first ]; then
+        UV_SYSTEM_CERTS=1 "$venv/uv/bin/uv" pip install --python "$venv/bin/python" --quiet --no-cache --no-config "$@" && return
+        echo "setup: uv failed; pip installs"
+        uv=never
+    fi
+    "$venv/bin/python" -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check --no-input "$@"
 }
 
 echo "setup: environment $venv with $("$python" --version)"
 "$python" -m venv "$venv"
+if command -v uv >/dev/null; then
+    uv=only
+elif ! has_settings && fetch_uv; then
+    uv=first
+else
+    uv=never
+fi
 if [ "$versions" = latest ]; then
     echo "setup: the newest versions of all packages (a minute or two)"
     install -e '.[dev]'
@@ -54,6 +80,8 @@ fi
     "$venv/bin/python" -c 'import pymeshlab'
 }
 
-# Compiled by all cores at once, our own modules as well: a run has a process for each job, and where
-# PYTHONDONTWRITEBYTECODE is set, as in many containers, each of them would compile all that it reads.
-"$venv/bin/python" -m compileall -q -j 0 "$venv/lib" src >/dev/null 2>&1 || true
+rm -rf "$venv/uv"
+
+# What a run imports is compiled once, and nothing else: where PYTHONDONTWRITEBYTECODE is set, as in many
+# containers, each of its processes would compile all that it imports.
+PYTHONDONTWRITEBYTECODE='' "$venv/bin/python" "$(dirname "$0")/import_all.py" >/dev/null 2>&1 || true
