@@ -200,7 +200,7 @@ def chart_at(xy: np.ndarray, steps: int = 12) -> np.ndarray:
     """
     target = xy[:, 0] + 1j * xy[:, 1]
     w = np.zeros(len(xy), dtype=complex)
-    delta = 1e-5
+    delta, limit, exact = 1e-5, 0.05, 1e-10
     for _ in range(steps):
         at, right, up = base_point(np.stack([w, w + delta, w + 1j * delta]))
         fx = (right[:, 0] - at[:, 0]) / delta, (up[:, 0] - at[:, 0]) / delta
@@ -210,8 +210,10 @@ def chart_at(xy: np.ndarray, steps: int = 12) -> np.ndarray:
         step_x = (residual.real * fy[1] - residual.imag * fx[1]) / determinant
         step_y = (residual.imag * fx[0] - residual.real * fy[0]) / determinant
         step = step_x + 1j * step_y
-        limit = 0.05
-        w = w + step * np.minimum(1.0, limit / np.maximum(np.abs(step), 1e-12))
+        length = np.abs(step)
+        w = w + step * np.minimum(1.0, limit / np.maximum(length, 1e-12))
+        if (length < exact).all():  # another step would be shorter by four digits at least
+            break
     return w
 
 

@@ -15,7 +15,12 @@ from vermilion.faces.procedural_layout import (
     skin_sheet,
     strip_triangles,
 )
-from vermilion.faces.procedural_mouth import border_chart, lip_point, socket_point
+from vermilion.faces.procedural_mouth import (
+    border_chart,
+    lip_point,
+    lip_rings,
+    socket_point,
+)
 
 N_LOOP = 160  # samples of the lips' loop that carry expression curves
 CARRY_REACH_MM = 60.0  # skin farther from the lips never follows them
@@ -79,9 +84,9 @@ def build_head_mesh(layout: Layout) -> HeadMesh:
 
     rings = [np.arange(n)]
     steps = _mouth_depths(layout)
-    for s in steps:
+    for s, ring in zip(steps, _mouth_rings(theta_ring, steps, layout.fold_end), strict=True):
         depth = np.full(n, s)
-        points.append(_mouth_ring(theta_ring, depth, layout.fold_end))
+        points.append(ring)
         charts.append(sheet.chart[:n])
         thetas.append(theta_ring)
         depths.append(depth)
@@ -131,10 +136,13 @@ def _mouth_depths(layout: Layout) -> list[float]:
     return [float(round(d, 9)) for d in depths]
 
 
-def _mouth_ring(theta: np.ndarray, s: np.ndarray, fold_end: float) -> np.ndarray:
-    if s[0] <= fold_end:
-        return lip_point(theta, s)
-    return socket_point(theta, s, lip_point(theta, np.full(len(theta), 2.0)))
+def _mouth_rings(theta: np.ndarray, steps: list[float], fold_end: float) -> list[np.ndarray]:
+    """The ring (n, 3) mm of each depth: lips and fold up to `fold_end`, then the socket."""
+    lips = [s for s in steps if s <= fold_end]
+    depths = np.array([*lips, 2.0])[:, None] + np.zeros(len(theta))
+    *rings, end = lip_rings(theta, depths)
+    sockets = [socket_point(theta, np.full(len(theta), s), end) for s in steps[len(lips) :]]
+    return [*rings, *sockets]
 
 
 def _lid_rings(margin: np.ndarray) -> list[np.ndarray]:
