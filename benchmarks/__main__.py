@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 from vermilion.app.subcommands import listing, parser_of, subcommands
 
 
+@cache
 def benchmarks() -> dict[str, str]:
     """Name of each benchmark -> the first line of its docstring."""
     return subcommands(Path(__file__).parent)

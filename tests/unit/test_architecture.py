@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.syntax import nodes_of, text_of, tree_of
 from vermilion.config.root import Configuration
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,27 +69,21 @@ def name_of(path):
 @cache
 def texts(folder):
     """Path -> text of every Python file below a folder of the project."""
-    return {path: path.read_text() for path in sorted((ROOT / folder).rglob("*.py"))}
-
-
-@cache
-def trees(folder):
-    """Path -> syntax tree of the same files."""
-    return {path: ast.parse(text) for path, text in texts(folder).items()}
+    return {path: text_of(path) for path in sorted((ROOT / folder).rglob("*.py"))}
 
 
 @cache
 def modules():
-    """Module name -> its syntax tree."""
-    return {name_of(path): tree for path, tree in trees("src/vermilion").items()}
+    """Module name -> its file."""
+    return {name_of(path): path for path in texts("src/vermilion")}
 
 
 @cache
 def imports():
     """Module name -> modules of the library that it imports, wherever the import stands."""
     found = defaultdict(set)
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
+    for name, path in modules().items():
+        for node in nodes_of(path):
             if isinstance(node, ast.ImportFrom):
                 assert node.level == 0, f"{name}: a relative import"
                 wanted = [(node.module, f"{node.module}.{alias.name}") for alias in node.names]
@@ -123,8 +118,8 @@ def test_no_room_imports_from_a_higher_one():
 def test_a_name_means_one_thing():
     """Public functions and classes of modules: two of a name do the same of two kinds, or are programs."""
     homes = defaultdict(list)
-    for module, tree in modules().items():
-        for node in tree.body:
+    for module, path in modules().items():
+        for node in tree_of(path).body:
             kinds = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
             if isinstance(node, kinds) and not node.name.startswith("_"):
                 homes[node.name].append(module)
@@ -176,8 +171,8 @@ def functions(folder):
     """Place -> each function below a folder of the project, without the kernels."""
     return {
         f"{path.relative_to(ROOT)}:{node.lineno}:{node.name}": node
-        for path, tree in trees(folder).items()
-        for node in ast.walk(tree)
+        for path in texts(folder)
+        for node in nodes_of(path)
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         and (str(path.relative_to(ROOT / folder)), node.name) not in KERNELS
     }

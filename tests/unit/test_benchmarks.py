@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import benchmarks, main
+from tests.syntax import tree_of
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = {
-    path.stem: ast.parse(path.read_text())
+    path.stem: tree_of(path)
     for path in sorted((ROOT / "benchmarks").glob("*.py"))
     if path.stem not in ("__init__", "__main__")
 }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.syntax import tree_of
 from tests.unit.default_pairs import CLASSES, FUNCTIONS, WITHOUT_SECTION
 from vermilion.config.root import Configuration
 from vermilion.config.studio import StudioTake
@@ -113,7 +114,7 @@ def classes_with_numbers():
     """module.Class of every dataclass of the library with a number as the default of a field."""
     for path in sorted(SOURCE.rglob("*.py")):
         parts = path.relative_to(SOURCE).with_suffix("").parts
-        for node in ast.parse(path.read_text()).body:
+        for node in tree_of(path).body:
             if parts[0] == "config" or not isinstance(node, ast.ClassDef):
                 continue
             if any("dataclass" in ast.unparse(d) for d in node.decorator_list) and any(

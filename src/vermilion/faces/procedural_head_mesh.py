@@ -18,7 +18,7 @@ from vermilion.faces.procedural_layout import (
 from vermilion.faces.procedural_mouth import (
     border_chart,
     lip_point,
-    lip_rings,
+    lip_surface,
     socket_point,
 )
 
@@ -140,7 +140,7 @@ def _mouth_rings(theta: np.ndarray, steps: list[float], fold_end: float) -> list
     """The ring (n, 3) mm of each depth: lips and fold up to `fold_end`, then the socket."""
     lips = [s for s in steps if s <= fold_end]
     depths = np.array([*lips, 2.0])[:, None] + np.zeros(len(theta))
-    *rings, end = lip_rings(theta, depths)
+    *rings, end = lip_surface(theta, depths)
     sockets = [socket_point(theta, np.full(len(theta), s), end) for s in steps[len(lips) :]]
     return [*rings, *sockets]
 

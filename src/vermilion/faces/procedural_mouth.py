@@ -114,10 +114,10 @@ def border_chart(theta: np.ndarray) -> np.ndarray:
 
 def lip_point(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Surface of vermilion and inner fold: `theta` (N,), `s` (N,) in [0, 2] -> (N, 3) mm."""
-    return lip_rings(theta, s[None])[0]
+    return lip_surface(theta, s[None])[0]
 
 
-def lip_rings(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
+def lip_surface(theta: np.ndarray, s: np.ndarray) -> np.ndarray:
     """As `lip_point`, several depths over the same places: `theta` (N,), `s` (R, N) -> (R, N, 3) mm."""
     u, upper = LIP_LOOP.u(theta), is_upper(theta)
     sign = np.where(upper, 1.0, -1.0)
