@@ -45,7 +45,8 @@ def first_guess(
         right = np.einsum("fn,fnik,fni->fk", trust, basis, target, optimize=True)
         for frame in range(n_frames):
             matrix = FrameMatrix(blocks[frame])
-            weights[frame] = solve_in_box(matrix, right[frame][None], 0.0, 1.0)[0]
+            before = weights[frame][None]  # of the last round: most bounds stay as they are
+            weights[frame] = solve_in_box(matrix, right[frame][None], 0.0, 1.0, before)[0]
     # The scale holds at the depth of the points' mean, not of the head's origin.
     share = (trust / trust.sum(axis=1, keepdims=True))[..., None]
     mean = (share * shape.points(weights)).sum(axis=1)
