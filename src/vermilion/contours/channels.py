@@ -23,17 +23,20 @@ CHANNELS = (
 )
 
 
+def colour_channels(linear_rgb: np.ndarray) -> np.ndarray:
+    """`COLOUR_CHANNELS` (3, h, w) float32 in [0, 1] of a region `linear_rgb` (h, w, 3), as of `image_channels`."""
+    return _in_range(_colours(_lab(linear_rgb)))
+
+
 def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
     """`CHANNELS` (C, h, w) float32 in [0, 1] of a region `linear_rgb` (h, w, 3).
 
     The region's exposure is normalised first (its median lightness becomes middle grey), so that
     flicker does not matter.
     """
-    luminance = linear_rgb @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-    gain = 0.18 / max(float(np.median(luminance)), 1e-4)
-    lab: np.ndarray = cv2.cvtColor(linear_to_srgb(linear_rgb * gain), cv2.COLOR_RGB2Lab)
-    lightness, red = lab[..., 0] / 100.0, lab[..., 1] / 128.0
-    channels: list[np.ndarray] = [lightness, 0.5 + lab[..., 1] / 128.0, 0.5 + lab[..., 2] / 128.0]
+    lab = _lab(linear_rgb)
+    channels, red = _colours(lab), lab[..., 1] / 128.0
+    lightness = channels[0]
     magnitudes, orientations, blobs = [], [], []
     for sigma in SCALES_PX:
         smooth = cv2.GaussianBlur(lightness, (0, 0), sigma)
@@ -42,7 +45,20 @@ def image_channels(linear_rgb: np.ndarray) -> np.ndarray:
         orientations += [4.0 * plane for plane in bins]
         blobs.append(0.5 + 2.0 * sigma**2 * cv2.Laplacian(smooth, cv2.CV_32F))
     redness, _ = oriented_gradient(cv2.GaussianBlur(red, (0, 0), 1.5), 1.5)
-    channels += [*magnitudes, *orientations, 6.0 * redness, *blobs]
+    return _in_range([*channels, *magnitudes, *orientations, 6.0 * redness, *blobs])
+
+
+def _lab(linear_rgb: np.ndarray) -> np.ndarray:
+    luminance = linear_rgb @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+    gain = 0.18 / max(float(np.median(luminance)), 1e-4)
+    return cv2.cvtColor(linear_to_srgb(linear_rgb * gain), cv2.COLOR_RGB2Lab)
+
+
+def _colours(lab: np.ndarray) -> list[np.ndarray]:
+    return [lab[..., 0] / 100.0, 0.5 + lab[..., 1] / 128.0, 0.5 + lab[..., 2] / 128.0]
+
+
+def _in_range(channels: list[np.ndarray]) -> np.ndarray:
     return np.clip(np.stack(channels), 0.0, 1.0).astype(np.float32)
 
 

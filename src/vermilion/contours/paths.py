@@ -16,9 +16,11 @@ def cheapest_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
     apart = (np.arange(m)[:, None] - np.arange(m)[None]).astype(np.float64) ** 2
     total = cost[0]
     origin = np.zeros((n, m), dtype=np.int64)
+    through = np.empty_like(apart)  # one table for all rows: new memory costs more than the sums
     for row in range(1, n):
-        through = total[None] + smoothness[row - 1] * apart
-        origin[row] = through.argmin(axis=1)
+        np.multiply(smoothness[row - 1], apart, out=through)
+        through += total
+        through.argmin(axis=1, out=origin[row])
         total = cost[row] + through[np.arange(m), origin[row]]
     path = np.empty(n, dtype=np.int64)
     path[-1] = int(np.argmin(total))

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vermilion.contours.channels import image_channels
+from vermilion.contours.channels import colour_channels
 from vermilion.contours.curves import (
     distance_across,
     inside_of,
@@ -258,7 +258,7 @@ class RidgeDetector(ContourDetector):
 
 def blurred_colours(image: np.ndarray) -> np.ndarray:
     """Colour channels (3, h, w) of an image (h, w, 3), a little blurred."""
-    colours = image_channels(image)[:3]
+    colours = colour_channels(image)
     return np.stack([cv2.GaussianBlur(plane, (0, 0), BLUR_PX) for plane in colours])
 
 
