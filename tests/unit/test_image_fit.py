@@ -109,15 +109,20 @@ def scene():
     return truth[:N_FRAMES], off, samples, appearance
 
 
+@pytest.fixture(scope="module")
+def images(scene):
+    """What the camera sees of the true frames; no test may change one."""
+    return [image_of(MODEL, mesh_of(MODEL, row)) for row in scene[0]]
+
+
 def in_pixels(x):
     return np.stack([1200.0 * v[:, :2] / v[:, 2:] for v in (mesh_of(MODEL, row) for row in x)])
 
 
-def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
+def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene, images):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
     face = start.face(samples)
-    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     problem = FrameProblem(face, appearance, SETTINGS, 0.5)
     valid = np.ones(N_FRAMES, dtype=bool)
     found = fit_frames(
@@ -138,11 +143,11 @@ def test_refinement_finds_pose_and_expression_to_a_tenth_of_a_millimetre(scene):
         assert residual[1] < 0.5 * residual[0]
 
 
-def test_a_change_of_exposure_moves_nothing(scene):
+def test_a_change_of_exposure_moves_nothing(scene, images):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
     face = start.face(samples)
-    image = image_of(MODEL, mesh_of(MODEL, truth[0]))
+    image = images[0]
     problem = FrameProblem(face, appearance, SETTINGS, 0.5)
     fits = [
         problem.solve(start.view(0, image * np.float32(gain), face, 1.0, len(SETTINGS.iterations)))
@@ -157,7 +162,7 @@ def test_a_change_of_exposure_moves_nothing(scene):
     assert photometric_residual(errors, trust) < 3.0
 
 
-def test_each_piece_is_fitted_under_its_own_light(scene, tmp_path):
+def test_each_piece_is_fitted_under_its_own_light(scene, images, tmp_path):
     truth, off, samples, appearance = scene
     start = take_start(MODEL, truth, off)
     face = start.face(samples)
@@ -172,18 +177,17 @@ def test_each_piece_is_fitted_under_its_own_light(scene, tmp_path):
         and (Appearance.load(tmp_path / "a.npz").light == read[1].light).all()
     )
     problems = {k: FrameProblem(face, found, SETTINGS, 0.5) for k, found in read.items()}
-    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     everything, piece = np.ones(N_FRAMES, dtype=bool), np.ones(N_FRAMES, dtype=np.int64)
     chunk = FrameChunk(start, everything, wrong, face, lambda row: images[row], 1.0, piece)
     alone = fit_frames(replace(chunk, piece=None), problems[1])
     assert np.array_equal(fit_frames(chunk, problems)["x"], alone["x"])
 
 
-def test_frames_of_varying_exposure_give_one_appearance(scene):
+def test_frames_of_varying_exposure_give_one_appearance(scene, images):
     truth, _, samples, _ = scene
+    truth, images = truth[:4], images[:4]
     start = take_start(MODEL, truth, truth)
     face = start.face(samples)
-    images = [image_of(MODEL, mesh_of(MODEL, row)) for row in truth]
     gains = np.linspace(0.7, 1.4, len(truth))
 
     def learnt(factors):
@@ -195,7 +199,7 @@ def test_frames_of_varying_exposure_give_one_appearance(scene):
         def problem_of(found):
             return FrameProblem(face, found, SETTINGS, 0.5)
 
-        return learn_appearance(np.arange(len(views)), views, face, samples, 0.2, 2, problem_of)
+        return learn_appearance(np.arange(len(views)), views, face, samples, 0.2, 1, problem_of)
 
     even, varied = learnt(np.ones(len(truth))), learnt(gains)
     sure = (even.seen > 1.0) & (varied.seen > 1.0)
@@ -228,7 +232,7 @@ def test_normals_change_with_the_weights_as_the_meshs_do():
         assert np.abs(change - slope[:, 0, k]).max() < 1e-3
 
 
-def test_layer_follows_what_the_model_cannot_make(scene):
+def test_layer_follows_what_the_model_cannot_make(scene, images):
     truth, _, samples, appearance = scene
     near = np.exp(-((MODEL.neutral_mm[:, :2] - [5, 5]) ** 2).sum(axis=1) / (2 * 15.0**2))
     bulge = near[:, None] * np.array([2.0, -1.0, 0.0])
@@ -242,7 +246,7 @@ def test_layer_follows_what_the_model_cannot_make(scene):
     assert near @ missed < 0.3 * near @ np.linalg.norm(bulge, axis=1)
     in_camera = found @ (rotation_matrix(view.start[:3]) @ view.reference).T
     assert np.abs(in_camera[:, 2]).max() < 1e-9
-    still = layer.solve(start.view(0, image_of(MODEL, mesh_of(MODEL, truth[0])), face, 1.0, 3))
+    still = layer.solve(start.view(0, images[0], face, 1.0, 3))
     assert np.linalg.norm(still, axis=1).mean() < 0.15  # mm
 
 

@@ -121,9 +121,12 @@ def interpolate(hits: Hits, triangles: np.ndarray, values: np.ndarray) -> np.nda
         (..., D) or (...); zero where nothing is hit.
     """
     hit = hits.triangle >= 0
-    weights = hits.barycentric[hit]
-    corners = values[triangles[hits.triangle[hit]]]
-    found = (corners * weights.reshape(*weights.shape, *([1] * (values.ndim - 1)))).sum(axis=1)
+    corners, weights = triangles[hits.triangle[hit]].T, hits.barycentric[hit].T
+    if values.ndim == 2:
+        weights = weights[..., None]
+    found = weights[0] * values[corners[0]]
+    for corner, weight in zip(corners[1:], weights[1:], strict=True):
+        found += weight * values[corner]
     result = np.zeros((*hits.triangle.shape, *values.shape[1:]), dtype=found.dtype)
     result[hit] = found
     return result
