@@ -10,6 +10,7 @@ import pycolmap
 
 from vermilion.geometry.camera_check import check_camera
 from vermilion.geometry.colmap import camera_of_images, read_colmap_model
+from vermilion.geometry.vectors import vector_lengths
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import atomic_folder
 
@@ -110,7 +111,7 @@ class Camera:
             normal = flat[:, :2].reshape(pixels.shape)
         local = np.concatenate([normal, np.ones((*normal.shape[:-1], 1))], axis=-1)
         directions = local @ self.rotation
-        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        directions /= vector_lengths(directions)
         return np.broadcast_to(self.centre_mm, directions.shape), directions
 
     def pixel_grid(self) -> np.ndarray:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from vermilion.geometry.vectors import vector_lengths
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -128,7 +130,9 @@ def submesh(triangles: np.ndarray, keep_vertices: np.ndarray) -> tuple[np.ndarra
 
 def normalised(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors (..., D) of vectors (..., D); zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    length = vector_lengths(np.asarray(vectors, dtype=float))
+    if (length > 0).all():
+        return vectors / length
     return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=float), where=length > 0)
 
 

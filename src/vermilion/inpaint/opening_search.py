@@ -205,15 +205,23 @@ def _best_contours(
 
 def _cheapest_steps(best: np.ndarray, smooth: float) -> tuple[np.ndarray, np.ndarray]:
     """Cheapest predecessor of every state, its contours at most two points away: (cost, (2, m, m))."""
-    size = best.shape[0]
-    padded = np.pad(best, 2, constant_values=1e9)
-    i, j = np.meshgrid(np.arange(size), np.arange(size), indexing="ij")
-    cheapest, came = np.full_like(best, np.inf), np.zeros((2, size, size), dtype=int)
-    for di in range(-2, 3):
-        for dj in range(-2, 3):
-            cost = padded[2 + di : 2 + di + size, 2 + dj : 2 + dj + size]
-            cost = cost + smooth * (di * di + dj * dj)
-            better = cost < cheapest
-            cheapest = np.where(better, cost, cheapest)
-            came[0][better], came[1][better] = (i + di)[better], (j + dj)[better]
-    return cheapest, came
+    # The cost of a step is a sum over the two contours: first the best of one, then of the other.
+    places = np.arange(best.shape[0])
+    across, by_j = _cheapest_shifts(best, smooth)
+    cheapest, by_i = (table.T for table in _cheapest_shifts(across.T, smooth))
+    i = places[:, None] + by_i
+    return cheapest, np.stack([i, places + by_j[i, places]])
+
+
+def _cheapest_shifts(best: np.ndarray, smooth: float) -> tuple[np.ndarray, np.ndarray]:
+    """Cheapest predecessor in the same row, at most two columns away: (cost, columns away), both (m, m)."""
+    size = best.shape[1]
+    padded = np.full((size, size + 4), 1e9)
+    padded[:, 2:-2] = best
+    cheapest, shift = padded[:, :size] + 4 * smooth, np.full((size, size), -2)
+    for away in range(-1, 3):
+        cost = padded[:, 2 + away : 2 + away + size] + smooth * away * away
+        better = cost < cheapest
+        np.copyto(cheapest, cost, where=better)
+        np.copyto(shift, away, where=better)
+    return cheapest, shift
