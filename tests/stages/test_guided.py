@@ -1,6 +1,7 @@
 """Guided correction from files to files: sketches and a sculpt, training, chunks, suggestions."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.export.objs import write_obj
 from vermilion.external.origin import Origin
 from vermilion.external.placement import Placement
-from vermilion.geometry.camera import write_cameras
+from vermilion.geometry.camera import Camera, write_cameras
 from vermilion.geometry.mesh import Mesh, adjacency
 from vermilion.geometry.mesh_files import write_ply
 from vermilion.geometry.polygons import Polygons
@@ -35,7 +36,11 @@ pytestmark = pytest.mark.slow
 N_FRAMES, SKETCHED, SCULPTED = 6, (1, 4), 5
 PLACE = {"subject": "s", "take": "t"}
 FACE = mouths.face
-CAMERA = mouths.camera("cam")
+
+
+@cache
+def camera() -> Camera:
+    return mouths.camera("cam")
 
 
 def config(name: str):
@@ -66,19 +71,19 @@ def take(tmp_path_factory, meshes):
         root / "identity.npz"
     )
     motion = HeadMotion(
-        np.repeat(CAMERA.rotation[None], N_FRAMES, axis=0),
-        np.repeat(CAMERA.translation[None], N_FRAMES, axis=0),
+        np.repeat(camera().rotation[None], N_FRAMES, axis=0),
+        np.repeat(camera().translation[None], N_FRAMES, axis=0),
         np.zeros((N_FRAMES, face.n_expressions)),
         np.zeros(N_FRAMES),
     )
     valid = np.ones(N_FRAMES, dtype=bool)
-    TrackedTake.of(frames, motion, valid, CAMERA, face).save(root / "fit.npz")
-    write_cameras(root / "cameras", {"cam": CAMERA})
+    TrackedTake.of(frames, motion, valid, camera(), face).save(root / "fit.npz")
+    write_cameras(root / "cameras", {"cam": camera()})
     for frame in frames:
         write_srgb8(root / "frames" / "cam" / f"{frame:06d}.png", np.full((640, 640, 3), 90, "u1"))
     write_sequence(root / "C" / "000000-000005.npy", base)
     for frame in SKETCHED:
-        sketch = replace(mouths.drawn(true[frame].astype(float), CAMERA), frame=frame)
+        sketch = replace(mouths.drawn(true[frame].astype(float), camera()), frame=frame)
         write_sketch(sketch_file(root, frame), sketch)
         refine(root, frame)
     sculpt = Mesh(sculpted(base[SCULPTED]), face.triangles)
@@ -178,7 +183,7 @@ def corrected(take, meshes):
 
 def off_px(mesh, sketch):
     """Mean distance (px) of a mesh's contours from a sketch."""
-    view = SketchView.of(sketch, CAMERA, RefinementSettings())
+    view = SketchView.of(sketch, camera(), RefinementSettings())
     found = view.contours(mesh.astype(float), mouths.surface())
     return np.concatenate(
         [found[name].nearest(view.samples[name])[1] for name in view.samples]
@@ -199,7 +204,7 @@ def test_a_refined_frame_lies_on_its_strokes_and_is_shown(take, meshes):
 def test_the_frames_without_a_sketch_follow(corrected, meshes):
     true, base = meshes
     for frame in sorted(set(range(N_FRAMES)) - set(SKETCHED)):
-        sketch = mouths.drawn(true[frame].astype(float), CAMERA)
+        sketch = mouths.drawn(true[frame].astype(float), camera())
         assert off_px(corrected[frame], sketch) < 0.6 * off_px(base[frame], sketch)
 
 
@@ -291,14 +296,14 @@ def test_suggestions_are_frames_that_nobody_corrected(take):
 
 
 def test_what_a_person_gave_is_checked(take):
-    sketch = replace(mouths.drawn(mouths.open_mouth(), CAMERA), frame=3)
+    sketch = replace(mouths.drawn(mouths.open_mouth(), camera()), frame=3)
     path = take / "wrong" / "side" / "000003.json"
     write_sketch(path, replace(sketch, camera="side"))
     with pytest.raises(InputError, match="one of the take's cameras: cam"):
-        read_sketch_views([path], {"cam": CAMERA}, 3)
+        read_sketch_views([path], {"cam": camera()}, 3)
     write_sketch(path, sketch)
     with pytest.raises(InputError, match="expected camera side, frame 3, as the file is named"):
-        read_sketch_views([path], {"cam": CAMERA}, 3)
+        read_sketch_views([path], {"cam": camera()}, 3)
     sculpt = take / "wrong" / "000003.ply"
     write_ply(sculpt, Mesh(np.zeros((4, 3)), np.array([[0, 1, 2]], dtype=np.int32)))
     with pytest.raises(InputError, match="a sculpt of 4 vertices and 1 triangles"):

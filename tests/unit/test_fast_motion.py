@@ -1,6 +1,7 @@
 """Blinks and closing lips stay whole, still faces stay still, cuts are not smoothed across."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,43 +14,56 @@ from vermilion.tracking.landmark_fit.shape import LandmarkShape
 from vermilion.tracking.landmark_fit.timeline import Timeline
 
 FOCAL_PX, FPS, N_FRAMES = 1400.0, 25.0, 40
-SHAPE = LandmarkShape.of(heads.small_tracker())
-NAMES = SHAPE.expression_names
 SETTINGS = LandmarkFitSettings()
 #: As before fast motion was let through.
 PLAIN = LandmarkFitSettings(weight_acceleration=60.0, fast_limit=1e9, lid_weight_sigma=0.5)
 #: Noise of a sharp video, in the landmarks' deviations.
 QUIET = 0.3
-LIDS = [k for k, name in enumerate(NAMES) if name.startswith("eyeBlink")]
-JAW = NAMES.index("jawOpen")
 BLINK = [0.0, 0.6, 1.0, 0.5, 0.0]
 
 
+@cache
+def shape() -> LandmarkShape:
+    return LandmarkShape.of(heads.small_tracker())
+
+
+def names() -> tuple[str, ...]:
+    return shape().expression_names
+
+
+def lids() -> list[int]:
+    return [k for k, name in enumerate(names()) if name.startswith("eyeBlink")]
+
+
+def jaw() -> int:
+    return names().index("jawOpen")
+
+
 def blinking(frames=slice(17, 22)):
-    weights = np.zeros((N_FRAMES, len(NAMES)))
-    weights[frames, LIDS] = np.array(BLINK)[:, None]
+    weights = np.zeros((N_FRAMES, len(names())))
+    weights[frames, lids()] = np.array(BLINK)[:, None]
     return weights
 
 
 def closing():
     """An open mouth whose lips close for one frame."""
-    weights = np.zeros((N_FRAMES, len(NAMES)))
-    weights[:, JAW] = 0.25
-    weights[20, JAW] = 0.0
+    weights = np.zeros((N_FRAMES, len(names())))
+    weights[:, jaw()] = 0.25
+    weights[20, jaw()] = 0.0
     return weights
 
 
 def images(weights, noise=0.0, seed=0, depth_mm=700.0):
-    points = SHAPE.points(weights) * [1, -1, -1] + np.array([0, 0, 1.0]) * depth_mm
+    points = shape().points(weights) * [1, -1, -1] + np.array([0, 0, 1.0]) * depth_mm
     image = project(points, FOCAL_PX)
-    sigma_px = SHAPE.sigma_mm(SETTINGS.noise)[:, None] * FOCAL_PX / 700.0
+    sigma_px = shape().sigma_mm(SETTINGS.noise)[:, None] * FOCAL_PX / 700.0
     image = image + noise * sigma_px * np.random.default_rng(seed).normal(size=image.shape)
     n = len(image)
     return Observations(image, np.ones((n, 66)), np.ones(n, dtype=bool))
 
 
 def fitted(weights, noise=0.0, settings=SETTINGS, seed=0):
-    return fit_motion(SHAPE, images(weights, noise, seed), FOCAL_PX, FPS, settings).weights
+    return fit_motion(shape(), images(weights, noise, seed), FOCAL_PX, FPS, settings).weights
 
 
 def jitter(weights):
@@ -58,21 +72,21 @@ def jitter(weights):
 
 @pytest.mark.parametrize("noise", [0.0, QUIET])
 def test_a_blink_comes_back(noise):
-    found = fitted(blinking(), noise)[17:22, LIDS].mean(axis=1)
+    found = fitted(blinking(), noise)[17:22, lids()].mean(axis=1)
     assert np.abs(found - BLINK).max() < 0.05
-    assert fitted(blinking(), noise, PLAIN)[19, LIDS].mean() < 0.7  # smoothness alone loses it
+    assert fitted(blinking(), noise, PLAIN)[19, lids()].mean() < 0.7  # smoothness alone loses it
 
 
 @pytest.mark.parametrize("noise", [0.0, QUIET])
 def test_lips_that_close_for_one_frame_close(noise):
-    found = fitted(closing(), noise)[19:22, JAW]
+    found = fitted(closing(), noise)[19:22, jaw()]
     assert np.abs(found - [0.25, 0.0, 0.25]).max() < 0.05
-    assert fitted(closing(), noise, PLAIN)[20, JAW] > 0.06
+    assert fitted(closing(), noise, PLAIN)[20, jaw()] > 0.06
 
 
 @pytest.mark.parametrize("noise", [QUIET, 1.0])
 def test_a_still_face_does_not_shake_more_than_with_smoothness_alone(noise):
-    still = np.zeros((N_FRAMES, len(NAMES)))
+    still = np.zeros((N_FRAMES, len(names())))
     shaken = [jitter(fitted(still, noise, seed=seed)) for seed in range(2)]
     before = [jitter(fitted(still, noise, PLAIN, seed)) for seed in range(2)]
     assert np.mean(shaken) < np.mean(before)
@@ -84,48 +98,48 @@ def joined(weights, settings, piece=None):
     matrices = np.tile(400.0 * np.eye(x.shape[1]), (len(x), 1, 1))
     known = np.ones(len(x), dtype=bool)
     timeline = Timeline.of(len(x), FPS, piece)
-    smooth = settings.smoothness(SHAPE, timeline, known, weights)
+    smooth = settings.smoothness(shape(), timeline, known, weights)
     return smooth_over_time(matrices, 400.0 * x, x, known, smooth)[:, N_POSE:]
 
 
 def test_the_join_of_the_image_fit_keeps_both():
     join = replace(SETTINGS, weight_acceleration=15.0, translation_acceleration_mm=200.0)
-    noise = 0.01 * np.random.default_rng(1).normal(size=(N_FRAMES, len(NAMES)))
-    found = joined(np.clip(blinking() + noise, 0, 1), join)[17:22, LIDS].mean(axis=1)
+    noise = 0.01 * np.random.default_rng(1).normal(size=(N_FRAMES, len(names())))
+    found = joined(np.clip(blinking() + noise, 0, 1), join)[17:22, lids()].mean(axis=1)
     assert np.abs(found - BLINK).max() < 0.05
-    assert abs(joined(np.clip(closing() + noise, 0, 1), join)[20, JAW]) < 0.05
+    assert abs(joined(np.clip(closing() + noise, 0, 1), join)[20, jaw()]) < 0.05
     still = np.abs(noise)
     held = replace(join, fast_limit=1e9)
     assert jitter(joined(still, join)) < 1.02 * jitter(joined(still, held)) < 0.1 * jitter(still)
-    assert joined(blinking(), held)[19, LIDS].max() < 0.7
+    assert joined(blinking(), held)[19, lids()].max() < 0.7
 
 
 def test_nothing_is_smoothed_across_a_cut():
-    weights = np.zeros((N_FRAMES, len(NAMES)))
-    weights[:20, NAMES.index("browOuterUp_L")] = 0.8  # slow shapes too
+    weights = np.zeros((N_FRAMES, len(names())))
+    weights[:20, names().index("browOuterUp_L")] = 0.8  # slow shapes too
     seen = images(weights, depth_mm=np.where(np.arange(N_FRAMES) < 20, 700.0, 900.0)[:, None, None])
     piece = np.repeat([0, 1], 20)
-    cut = fit_motion(SHAPE, seen, FOCAL_PX, Timeline.of(N_FRAMES, FPS, piece), SETTINGS)
+    cut = fit_motion(shape(), seen, FOCAL_PX, Timeline.of(N_FRAMES, FPS, piece), SETTINGS)
     alone = [
-        fit_motion(SHAPE, seen[np.arange(*part)], FOCAL_PX, FPS, SETTINGS)
+        fit_motion(shape(), seen[np.arange(*part)], FOCAL_PX, FPS, SETTINGS)
         for part in ((0, 20), (20, 40))
     ]
     depth = np.concatenate([part.translation_mm[:, 2] for part in alone])
     assert np.abs(cut.translation_mm[:, 2] - depth).max() < 0.5
     assert np.abs(cut.weights - np.concatenate([part.weights for part in alone])).max() < 0.01
-    whole = fit_motion(SHAPE, seen, FOCAL_PX, FPS, SETTINGS)
+    whole = fit_motion(shape(), seen, FOCAL_PX, FPS, SETTINGS)
     assert np.abs(whole.translation_mm[:, 2] - depth).max() > 5.0
 
 
 def test_frames_without_a_face_are_filled_from_their_own_piece():
     seen = images(
-        np.zeros((N_FRAMES, len(NAMES))),
+        np.zeros((N_FRAMES, len(names()))),
         depth_mm=np.where(np.arange(N_FRAMES) < 20, 700.0, 900.0)[:, None, None],
     )
     for rows in (slice(15, 20), slice(20, 24)):
         seen.valid[rows], seen.trust[rows] = False, 0.0
     timeline = Timeline.of(N_FRAMES, FPS, np.repeat([0, 1], 20))
-    depth = fit_motion(SHAPE, seen, FOCAL_PX, timeline, SETTINGS).translation_mm[:, 2]
+    depth = fit_motion(shape(), seen, FOCAL_PX, timeline, SETTINGS).translation_mm[:, 2]
     assert np.abs(depth[15:20] - depth[10]).max() < 2.0
     assert np.abs(depth[20:24] - depth[30]).max() < 2.0
 

@@ -19,7 +19,7 @@ from vermilion.geometry.polygons import Polygons
 @pytest.fixture(scope="module")
 def scene():
     """Studio and tracker of the embedded model, a person, three frames of the tracker's own shapes."""
-    studio = procedural.studio_model(n_identities=6)
+    studio = procedural.studio_model(1.2, 6)
     tracker = procedural.tracker_model(3000, 6)
     identity = np.array([1.0, -0.7, 0.5, 0, 0.3, 0])
     weights = np.zeros((3, tracker.n_expressions))

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import sparse
 
-from vermilion.faces import procedural
+from tests import heads
 from vermilion.geometry.deformation_gradients import deformation_gradients
 from vermilion.geometry.gradient_sums import GradientSums, turned_by
 from vermilion.geometry.mesh import vertex_normals
@@ -11,7 +11,7 @@ from vermilion.geometry.vertex_normals import VertexNormals
 
 
 def moved_face():
-    face = procedural.tracker_model(1500, 4)
+    face = heads.small_tracker()
     pose = face.vertices(None, np.full(face.n_expressions, 0.4))
     return face, pose + np.random.default_rng(0).normal(0, 0.2, pose.shape)
 

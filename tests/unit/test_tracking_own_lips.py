@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vermilion.faces.procedural import tracker_model
+from tests import heads
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.scheme import MOUTH
 from vermilion.landmarks.sets import IBUG66, MEDIAPIPE478
@@ -24,7 +24,7 @@ PRIOR = OwnLips(range_mm=10.0, sigma_mm=2.0, noise_mm=0.3)
 
 @pytest.fixture(scope="module")
 def model():
-    return tracker_model(3000, 4)
+    return heads.small_tracker()
 
 
 @pytest.fixture(scope="module")
