@@ -1,6 +1,7 @@
 """The image as a constraint on a corrected mesh: contours, contact, pose, neighbours in time."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -77,8 +78,14 @@ def take_of(heads_mm, image, pose=None, frames=None):
     )  # fmt: skip
 
 
+@cache
+def agreement(settings):
+    """Factored once for all takes of the face."""
+    return ImageAgreement(integrator(), FACE.neutral_mm, FACE, N_SAMPLES, settings)
+
+
 def fitted(corrected, image, settings, coarse=None, pose=None, frames=None):
-    fit = ImageAgreement(integrator(), FACE.neutral_mm, FACE, N_SAMPLES, settings)
+    fit = agreement(settings)
     coarse = corrected if coarse is None else coarse
     return fit.fit(corrected, take_of(coarse, image, pose, frames), image)
 

@@ -55,7 +55,7 @@ def test_points_across_the_lip_are_each_others_in_a_mirror():
 
 def test_the_inner_lip_does_not_stay_on_the_teeth():
     greys, truth = opening_mouth()
-    engine = FaceFlow(280.0)
+    engine = FaceFlow(200.0)
     flows = [
         engine.between(a, b, truth[k], truth[k + 1]) for k, (a, b) in enumerate(pairwise(greys))
     ]
