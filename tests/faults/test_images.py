@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -92,11 +93,16 @@ def png_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", check)
 
 
-def png(width: int, height: int) -> bytes:
+@cache
+def zeros_of_ten_megabytes() -> bytes:
     import zlib
 
+    return zlib.compress(bytes(10_000_000), 9)
+
+
+def png(width: int, height: int) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    data = zlib.compress(bytes(10_000_000), 9)
+    data = zeros_of_ten_megabytes()
     return (
         b"\x89PNG\r\n\x1a\n"
         + png_chunk(b"IHDR", header)

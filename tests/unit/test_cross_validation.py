@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.model_selection import GroupKFold
 
 from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import (
@@ -14,6 +13,13 @@ from vermilion.regression.cross_validation import (
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork, temporal_prototypes
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.linear import unseen_subject_bias
+
+
+def group_folds(n_folds, clips):
+    # Where it is needed: every process of the tests imports this file, one of them runs it.
+    from sklearn.model_selection import GroupKFold
+
+    return GroupKFold(n_folds).split(clips, groups=clips)
 
 
 @pytest.fixture
@@ -46,7 +52,7 @@ def test_clips_are_contiguous_and_never_cross_sequences():
 def test_folds_are_those_of_group_k_fold(n_folds):
     clips = np.random.default_rng(3).integers(0, 17, 200)
     ours = folds_of(clips, n_folds)
-    theirs = GroupKFold(min(n_folds, 17)).split(clips, groups=clips)
+    theirs = group_folds(min(n_folds, 17), clips)
     for fold, (train, held) in zip(ours, theirs, strict=True):
         assert np.array_equal(fold[0], train)
         assert np.array_equal(fold[1], held)
@@ -63,7 +69,7 @@ def test_cross_validation_equals_fitting_and_predicting(data):
     curve = cross_validate(network, *given, alphas=alphas, betas=betas)
     affine = cross_validate(AffineRegressor(), *given, alphas=alphas)
     kernel = cross_validate(KernelRegressor(), *given, alphas=alphas, betas=betas)
-    for k, (train, held) in enumerate(GroupKFold(5).split(clips, groups=clips)):
+    for k, (train, held) in enumerate(group_folds(5, clips)):
 
         def error(regressor, train=train, held=held):
             fitted = regressor.fit(features[train], targets[train], sequences[train])
@@ -89,7 +95,7 @@ def test_cross_validation_with_a_bias_a_person_equals_fitting_and_predicting(dat
         AffineRegressor(), features, target_gram(targets), persons, clips,
         alphas=[0.1], n_folds=4, persons=persons,
     )  # fmt: skip
-    for k, (train, held) in enumerate(GroupKFold(4).split(clips, groups=clips)):
+    for k, (train, held) in enumerate(group_folds(4, clips)):
         people, label = np.unique(persons[train], return_inverse=True)
         regressor = AffineRegressor(0.1).fit(features[train], targets[train], persons=label)
         squares = []

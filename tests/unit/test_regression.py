@@ -2,12 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.base import clone
-from sklearn.kernel_ridge import KernelRidge
-from sklearn.linear_model import Ridge
-from sklearn.model_selection import GridSearchCV
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from tests.unit.regression_data import smooth_data
 from vermilion.regression.cross_validation import (
@@ -22,6 +16,19 @@ from vermilion.regression.estimators import (
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.ridge import ridge_weights
 from vermilion.regression.scaling import feature_scale
+
+
+@pytest.fixture(scope="module")
+def sklearn():
+    """Imported where it is needed: every process of the tests imports this file, one of them runs it."""
+    import sklearn.base
+    import sklearn.kernel_ridge
+    import sklearn.linear_model
+    import sklearn.model_selection
+    import sklearn.pipeline
+    import sklearn.preprocessing
+
+    return sklearn
 
 
 @pytest.fixture
@@ -39,20 +46,20 @@ def test_primal_equals_dual(data):
         np.testing.assert_allclose(a, b, atol=1e-10)
 
 
-def test_rbf_network_is_ridge_on_its_activations(data):
+def test_rbf_network_is_ridge_on_its_activations(data, sklearn):
     features, targets = data
     network = RBFNetwork(alpha=0.2, beta=0.5).fit(features, targets)
     activations = network.activations(features)
-    peer = Ridge(alpha=0.2).fit(activations, targets)
+    peer = sklearn.linear_model.Ridge(alpha=0.2).fit(activations, targets)
     np.testing.assert_allclose(network.coefficients_ @ network.basis_, peer.coef_.T, atol=1e-8)
     np.testing.assert_allclose(network.bias_, peer.intercept_, atol=1e-8)
     np.testing.assert_allclose(network.predict(features), peer.predict(activations), atol=1e-9)
 
 
-def test_affine_regressor_is_ridge_on_scaled_features(data):
+def test_affine_regressor_is_ridge_on_scaled_features(data, sklearn):
     features, targets = data
     regressor = AffineRegressor(alpha=0.7).fit(features, targets)
-    peer = Ridge(alpha=0.7).fit(regressor.scaled(features), targets)
+    peer = sklearn.linear_model.Ridge(alpha=0.7).fit(regressor.scaled(features), targets)
     np.testing.assert_allclose(
         regressor.predict(features), peer.predict(regressor.scaled(features)), atol=1e-9
     )
@@ -112,8 +119,8 @@ def test_a_basis_changes_predictions_by_no_more_than_is_allowed(data, allowed):
     )
 
 
-def test_scikit_learn_contract():
-    network = clone(RBFNetwork(alpha=3.0, beta=2.0))
+def test_scikit_learn_contract(sklearn):
+    network = sklearn.base.clone(RBFNetwork(alpha=3.0, beta=2.0))
     assert network.get_params()["alpha"] == 3.0
     assert network.set_params(beta=5.0).beta == 5.0
     with pytest.raises(ValueError, match="RBFNetwork has no 'gamma'; it has alpha"):
@@ -124,10 +131,14 @@ def test_scikit_learn_contract():
         AffineRegressor().fit(np.eye(7), np.eye(7)).predict(np.zeros((2, 6)))
 
 
-def test_scikit_learn_searches_and_scores_a_regressor_in_a_pipeline(data):
+def test_scikit_learn_searches_and_scores_a_regressor_in_a_pipeline(data, sklearn):
     features, _ = data
-    steps = make_pipeline(StandardScaler(), AffineRegressor())
-    search = GridSearchCV(steps, {"affineregressor__alpha": [1e-3, 1e9]}, cv=3)
+    steps = sklearn.pipeline.make_pipeline(
+        sklearn.preprocessing.StandardScaler(), AffineRegressor()
+    )
+    search = sklearn.model_selection.GridSearchCV(
+        steps, {"affineregressor__alpha": [1e-3, 1e9]}, cv=3
+    )
     search.fit(features, features @ np.ones((features.shape[1], 2)))
     assert search.best_params_ == {"affineregressor__alpha": 1e-3}
     assert search.best_score_ > 0.99
@@ -176,7 +187,7 @@ def test_beyond_the_reach_the_prediction_is_drawn_to_the_mean(data, kind):
 
 
 @pytest.mark.parametrize("linear", [0.0, 0.5])
-def test_the_kernel_regressor_is_kernel_ridge_on_all_frames(data, linear):
+def test_the_kernel_regressor_is_kernel_ridge_on_all_frames(data, linear, sklearn):
     """Its low-rank factor against the dual with the whole kernel matrix, the mean taken out."""
     features, targets = data
     regressor = KernelRegressor(0.05, 2.0, linear, tolerance=1e-12).fit(features, targets)
@@ -188,7 +199,9 @@ def test_the_kernel_regressor_is_kernel_ridge_on_all_frames(data, linear):
     new = features[:9] + 0.3
     expected = regressor.kernel(regressor.scaled(new), scaled) @ dual + bias
     np.testing.assert_allclose(regressor.predict(new), expected, atol=1e-6)
-    peer = KernelRidge(alpha=0.05, kernel="precomputed").fit(centre @ kernel @ centre, targets)
+    peer = sklearn.kernel_ridge.KernelRidge(alpha=0.05, kernel="precomputed").fit(
+        centre @ kernel @ centre, targets
+    )
     np.testing.assert_allclose(centre @ peer.dual_coef_, dual, atol=1e-8)
 
 

@@ -1,5 +1,8 @@
 """A take, its desk, and who comes to the page."""
 
+import shutil
+from dataclasses import replace
+
 import pytest
 from starlette.testclient import TestClient
 
@@ -14,9 +17,17 @@ from vermilion.app.sketch.server import application
 from vermilion.app.sketch.take_files import TakeFiles
 
 
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """Made once; no test opens it itself."""
+    return make_take(tmp_path_factory.mktemp("made"))
+
+
 @pytest.fixture(scope="module")
-def take(tmp_path_factory):
-    return make_take(tmp_path_factory.mktemp("take"))
+def take(made, tmp_path_factory):
+    return replace(
+        made, folder=shutil.copytree(made.folder, tmp_path_factory.mktemp("take") / "take")
+    )
 
 
 @pytest.fixture(scope="module")
