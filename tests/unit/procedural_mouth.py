@@ -32,13 +32,19 @@ def lip_triangles(model: FaceModel, which: str) -> np.ndarray:
     return model.triangles[keep[model.triangles].all(axis=1)]
 
 
+def caster_of(vertices: np.ndarray, triangles: np.ndarray) -> RayCaster:
+    """Of a small part of a mesh: without the vertices that it does not use, which take longer than it does."""
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return RayCaster(vertices[used], renumbered.reshape(triangles.shape))
+
+
 def lip_gap_mm(model: FaceModel, vertices: np.ndarray) -> float:
     """Least vertical distance from the lower lip's top to the upper lip's underside."""
     x, z = np.meshgrid(np.arange(-30, 30, 0.5), np.arange(60, 115, 0.5))
     below, above = np.stack([x, 0 * x - 200, z], -1), np.stack([x, 0 * x + 200, z], -1)
     up = np.broadcast_to([0.0, 1.0, 0.0], below.shape)
-    upper = RayCaster(vertices, lip_triangles(model, "vermilion_upper")).cast(below, up)
-    lower = RayCaster(vertices, lip_triangles(model, "vermilion_lower")).cast(above, -up)
+    upper = caster_of(vertices, lip_triangles(model, "vermilion_upper")).cast(below, up)
+    lower = caster_of(vertices, lip_triangles(model, "vermilion_lower")).cast(above, -up)
     gap = (upper.distance_mm - 200.0) - (200.0 - lower.distance_mm)
     return float(gap[upper.hit & lower.hit].min(initial=np.inf))
 

@@ -18,7 +18,7 @@ from vermilion.landmarks.key_frames import BETWEEN, GIVEN, NEUTRAL, KeyFrames, f
 from vermilion.storage.errors import InputError
 
 N_FRAMES, STEP_PX = 7, np.array([1.5, -0.75])
-SETTINGS = LandmarkCorrectionSettings(face_px=120.0)
+SETTINGS = LandmarkCorrectionSettings(face_px=90.0)
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +185,7 @@ def test_where_flow_is_lost_the_detector_settles(clip):
     track = detected(truth, noise_px=0.0)
     keys = key_frames(track.points_px, [0, 6], [NEUTRAL, BETWEEN])
     lost = correct_key_frames(
-        reader(others), track, keys, LandmarkCorrectionSettings(face_px=120.0, mouth=0.5)
+        reader(others), track, keys, LandmarkCorrectionSettings(face_px=90.0, mouth=0.5)
     )
     moved_px = np.linalg.norm(lost.points_px[1] - truth[6], axis=-1)
     assert np.median(moved_px) < 2.0

@@ -41,7 +41,7 @@ def rig() -> dict[str, Camera]:
 def points() -> np.ndarray:
     """Points on a dome of the size of a face, denser in the middle."""
     rng = np.random.default_rng(0)
-    xy = np.concatenate([rng.uniform(-70, 70, (300, 2)), rng.uniform(-28, 28, (200, 2))])
+    xy = np.concatenate([rng.uniform(-70, 70, (180, 2)), rng.uniform(-28, 28, (120, 2))])
     depth = (xy**2).sum(axis=1) / 130 + rng.uniform(-4, 4, len(xy))
     return np.concatenate([xy, depth[:, None]], axis=1)
 
