@@ -19,7 +19,8 @@ from vermilion.studio.capture_writer import (
     write_labels,
     write_truth,
 )
-from vermilion.studio.labels import label_frames, lip_contours, view_mouth
+from vermilion.studio.label_frames import label_frames
+from vermilion.studio.labels import lip_contours, view_mouth
 from vermilion.studio.render import render
 from vermilion.studio.rig import RigSettings
 from vermilion.studio.surface import surface_of

@@ -6,7 +6,7 @@ wants to know the names of outputs beforehand, there is one rule a take and chun
 """
 
 from vermilion.config.studio import StudioSubject, StudioTake
-from vermilion.studio.labels import label_frames
+from vermilion.studio.label_frames import label_frames
 from vermilion.studio.rig import FRONTAL_PAIR, camera_names
 
 STUDIO_PLAN_KEYS = (

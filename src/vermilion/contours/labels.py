@@ -8,7 +8,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
 
 from vermilion.contours.paths import cheapest_path
 from vermilion.geometry.polylines import evenly_along, lengths_along
@@ -91,6 +90,8 @@ def label_paths(capture: Source, camera: str) -> dict[int, Path]:
 
 def distance_to(points_px: np.ndarray, size: int) -> np.ndarray:
     """Distance (size, size) px of each pixel centre of a region to dense `points_px` (n, 2)."""
+    from scipy.spatial import cKDTree  # the workflow asks for `label_paths` at each start
+
     x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
     grid = np.stack([x.ravel(), y.ravel()], axis=1)
     distance, _ = cKDTree(points_px).query(grid)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 
@@ -13,30 +12,15 @@ def cheapest_path(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:
         cost: (n, m); infinite where the path must not go.
         smoothness: (n,) cost of one column's step, squared, between row k and the next.
     """
+    from vermilion.contours.path_kernel import cheapest_totals  # numba takes a quarter of a second
+
     totals, origin = np.array(cost, dtype=float), np.zeros(cost.shape, dtype=np.int64)
-    _accumulate(totals, np.asarray(smoothness, dtype=float), origin)
+    cheapest_totals(totals, np.asarray(smoothness, dtype=float), origin)
     path = np.empty(len(cost), dtype=np.int64)
     path[-1] = totals[-1].argmin()
     for row in range(len(cost) - 1, 0, -1):
         path[row - 1] = origin[row, path[row]]
     return path
-
-
-@numba.njit(cache=True)
-def _accumulate(
-    totals: np.ndarray, smoothness: np.ndarray, origin: np.ndarray
-) -> None:  # pragma: no cover - compiled
-    """Add to each cost of `totals` (n, m) that of the cheapest way there; `origin` (n, m) is where it comes from."""
-    for row in range(1, totals.shape[0]):
-        for column in range(totals.shape[1]):
-            least, place = np.inf, 0
-            for before in range(totals.shape[1]):
-                away = float(column - before)
-                through = totals[row - 1, before] + smoothness[row - 1] * (away * away)
-                if through < least:
-                    least, place = through, before
-            totals[row, column] += least
-            origin[row, column] = place
 
 
 def cheapest_ring(cost: np.ndarray, smoothness: np.ndarray) -> np.ndarray:

@@ -15,8 +15,12 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from vermilion.provenance.known_code import known_code
+
 PACKAGE = "vermilion"
 SOURCE = Path(__file__).resolve().parents[1]
+#: What was found before this file changed does not count.
+_HOW = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 
 
 @cache
@@ -28,9 +32,9 @@ def fingerprint(script: Path, source: Path = SOURCE) -> str:
         source: folder of the package `vermilion`.
     """
     closure = sorted(imported_files(script, source))
-    digest = hashlib.sha256(_read(script, source).text.encode())
+    digest = hashlib.sha256(_read(script, source).digest.encode())
     for path in closure:
-        digest.update(f"\n{path.relative_to(source)}\n{_read(path, source).text}".encode())
+        digest.update(f"\n{path.relative_to(source)}\n{_read(path, source).digest}".encode())
     return digest.hexdigest()[:16]
 
 
@@ -47,16 +51,31 @@ def imported_files(script: Path, source: Path = SOURCE) -> set[Path]:
 
 
 class _Code(NamedTuple):
-    """What counts of a file: its syntax tree without docstrings as text, and what it imports."""
+    """What counts of a file: a digest of its syntax tree without docstrings, and what it imports."""
 
-    text: str
+    digest: str
     imports: tuple[Path, ...]
 
 
 @cache
 def _read(path: Path, source: Path) -> _Code:
+    content = path.read_bytes()
+    # Relative imports depend on where the file stands.
+    place = path.relative_to(source) if path.is_relative_to(source) else ""
+    key = hashlib.sha256(f"{_HOW}\n{place}\n".encode() + content).hexdigest()
+    found = known_code().get(key)
+    if found is None:
+        found = _parsed(content, path, source)
+        known_code().add(key, *found)
+    digest, names = found
+    files = {file for name in names for file in _files_of(name, source)}
+    return _Code(digest, tuple(sorted(files)))
+
+
+def _parsed(content: bytes, path: Path, source: Path) -> tuple[str, tuple[str, ...]]:
+    """The digest of a file's code, and the names of modules of the package that it imports."""
     with _without_collection():
-        tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+        tree = ast.parse(content, filename=str(path))
         statements = list(_statements(tree))
         names: set[str] = set()
         for node in statements:
@@ -71,9 +90,9 @@ def _read(path: Path, source: Path) -> _Code:
                 and ast.get_docstring(node, clean=False) is not None
             ):
                 node.body = node.body[1:] or [ast.Pass()]
-        text = ast.dump(tree)
-    files = {file for name in names for file in _files_of(name, source)}
-    return _Code(text, tuple(sorted(files)))
+        digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+    own = {name for name in names if name.partition(".")[0] == PACKAGE}
+    return digest, tuple(sorted(own))
 
 
 _WITH_DOCSTRING = ast.Module | ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
@@ -108,6 +127,7 @@ def _absolute(node: ast.ImportFrom, path: Path, source: Path) -> str:
     return ".".join([*parent, *([node.module] if node.module else [])])
 
 
+@cache
 def _files_of(name: str, source: Path) -> list[Path]:
     """The module's file and the `__init__.py` of each package on the way to it."""
     parts = name.split(".")

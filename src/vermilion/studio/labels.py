@@ -151,10 +151,3 @@ def write_landmarks(path: str | Path, image: str, points_px: np.ndarray) -> None
     """Write a landmark label: `points_px` (66, 2)."""
     content = {"unit": "px", "image": image, "points": np.round(points_px, 2).tolist()}
     write_text(path, json.dumps(content) + "\n")
-
-
-def label_frames(first: int, last: int, count: int) -> list[int]:
-    """The frames whose contours are drawn: the neutral, and others evenly through the take."""
-    if count <= 0:
-        return []
-    return sorted({round(f) for f in np.linspace(first, last, count + 1)[:count]})
