@@ -193,7 +193,7 @@ def write_page(root, ev):
             "quality": root / "quality.tsv",
             **{name: [ev / file] for name, file in SHEETS.items()},
             "reconstructions": [root / "takes/ana/rom/multiview/report.html"],
-            "training": [root / "models/MS.cv.png"],
+            "training": [root / "models/MS.cv.svg"],
             "overlays": [overlay],
             "videos": [],
             "timelines": [],
