@@ -39,7 +39,12 @@ def alone(execute):
 
 def _execute(execute, before, executor_plugin, *arguments, **options):
     """Put in order what a killed run left behind; execute; leave nothing unfinished behind."""
-    age_s = 0 if executor_plugin.common_settings.local_exec else _REMOTE_JOBS_S
+    local = executor_plugin.common_settings.local_exec
+    age_s = 0 if local else _REMOTE_JOBS_S
+    if local:
+        # The limit protects queues from many jobs at once; the cores of this machine limit by themselves. Under
+        # it, each finished job adds a timer that looks at all ready jobs again and again until the run ends.
+        workflow.scheduling_settings.max_jobs_per_timespan = None
     if before.was_killed:
         remove_stale_locks()
         remove_unfinished(R, age_s)

@@ -59,8 +59,8 @@ def _brow(x, y, brows):
             along = (k + t) / 4.0  # 0 at the first point of this side
             inner = along if side == 0 else 1.0 - along  # 1 next to the nose
             width = 1.3 + 2.6 * min(inner * 1.6, 1.0)
-            d = math.hypot(x - ax - t * bx, y - ay - t * by) / width
-            best = min(best, d)
+            dx, dy = x - ax - t * bx, y - ay - t * by
+            best = min(best, math.sqrt(dx * dx + dy * dy) / width)
     return best
 
 
@@ -82,8 +82,8 @@ def _skin_albedo(out, volume, look, brows, chin, p, lip, inside, footprint):
     ax, brow_top = abs(p[0]), max(brows[0, 2, 1], brows[1, 2, 1])
     if p[1] > brow_top - 30.0:
         strands = _octave(volume, x * 2.2, y * 0.8, z, 0.55, footprint, 0.8)
-        d = _brow(p[0], p[1], brows)
-        if d < 2.0 and p[2] > 0.0:
+        d = _brow(p[0], p[1], brows) if p[2] > 0.0 else 2.0
+        if d < 2.0:
             w = (1.0 - _smoothstep(0.35, 1.35, d + 0.22 * strands)) * 0.82
             r += (look.brows[0] - r) * w
             gr += (look.brows[1] - gr) * w
@@ -244,7 +244,7 @@ def shade_hits(
                 hx, hy, hz = lx - dx, ly - dy, lz - dz
                 half = (nx * hx + ny * hy + nz * hz) / math.sqrt(hx * hx + hy * hy + hz * hz)
                 if half > 0.0:
-                    lobe = fresnel * (power + 8.0) / 8.0 * half**power * cosine * shadow
+                    lobe = fresnel * (power + 8.0) / 8.0 * half ** int(power) * cosine * shadow
                     r += lobe * light_colour[m, 0]
                     g += lobe * light_colour[m, 1]
                     b += lobe * light_colour[m, 2]
