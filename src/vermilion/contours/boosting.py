@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from vermilion.contours.pool import FeaturePool, box_feature
+from vermilion.storage.kernels import kernel
 
 N_BINS = 64
 CHECK_EVERY = 4  # trees between two rejections at evaluation
@@ -144,7 +144,7 @@ def bin_features(
     return _bin_features(flat, offsets, pool.weights, starts, edges)
 
 
-@numba.njit(cache=True)
+@kernel()
 def _bin_features(flat, offsets, weights, starts, edges):
     codes = np.empty((len(offsets), len(starts)), dtype=np.uint8)
     for f in range(len(offsets)):
@@ -160,7 +160,7 @@ def _bin_features(flat, offsets, weights, starts, edges):
     return codes
 
 
-@numba.njit(cache=True)
+@kernel()
 def _grow(codes, gradient, curvature, depth, l2):
     """Splits of one tree: (feature of each node, its last bin to the left or -1)."""
     n_nodes = 2**depth - 1
@@ -191,7 +191,7 @@ def _grow(codes, gradient, curvature, depth, l2):
     return split, cut
 
 
-@numba.njit(cache=True)
+@kernel()
 def _best_cut(sums, l2):
     """(gain, last bin to the left) of the best split of a node's histogram (N_BINS, 2)."""
     all_up, all_down = sums[:, 0].sum(), sums[:, 1].sum()
@@ -210,7 +210,7 @@ def _best_cut(sums, l2):
     return best, last
 
 
-@numba.njit(cache=True)
+@kernel()
 def _leaves(codes, split, cut):
     """Leaf of each sample in a tree, (n,) int32."""
     n_nodes = len(split)
@@ -224,7 +224,7 @@ def _leaves(codes, split, cut):
     return node
 
 
-@numba.njit(cache=True)
+@kernel()
 def _log_odds(flat, offsets, weights, starts, feature, threshold, leaf, prior, reject):
     n = len(starts)
     score = np.full(n, prior, dtype=np.float32)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from vermilion.contours.channels import PAD
+from vermilion.storage.kernels import kernel
 
 MAX_BOXES = 4
 KINDS = ("mean", "two_across", "two_down", "three_across", "three_down", "checker", "apart")
@@ -115,7 +115,7 @@ def _corner(extent: int, half: int, random: np.random.Generator) -> int:
     return int(random.integers(-half, half - extent + 2))
 
 
-@numba.njit(cache=True, inline="always")
+@kernel(inline="always")
 def box_feature(flat, offsets, weights, f, start):
     """Feature f at one pixel of the region, of what `FeaturePool.laid_out` gives."""
     # Unused boxes are empty and summed all the same, and places are unsigned: a branch here that is
@@ -132,7 +132,7 @@ def box_feature(flat, offsets, weights, f, start):
     return value
 
 
-@numba.njit(cache=True)
+@kernel()
 def _evaluate(flat, offsets, weights, starts):
     values = np.empty((len(offsets), len(starts)), dtype=np.float32)
     for f in range(len(offsets)):

@@ -121,7 +121,7 @@ class LayerIntegrator:
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = layers[part]
             frames_last[..., : len(given)] = np.transpose(given, (1, 2, 0))
-            accumulate(  # type: ignore[call-arg]  # the stub of a dispatcher takes no arguments
+            accumulate(
                 *self._triangles(points), frames_last, *_series(points.dtype), right
             )
             if len(self.places):
@@ -154,7 +154,7 @@ class LayerIntegrator:
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = mixture[part]
             lanes[:, : len(given)] = given.T
-            accumulate_mixture(  # type: ignore[call-arg]  # as above
+            accumulate_mixture(
                 *self._triangles(points), basis, lanes, *_series(basis.dtype), right
             )
             if len(self.places):

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from vermilion.geometry.deformation_gradients import deformation_gradients
 from vermilion.geometry.rotations import nearest_rotation, rotation_matrix, rotation_vector
+from vermilion.storage.kernels import kernel
 
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 
@@ -70,7 +70,7 @@ def polar_decomposition(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rotations.reshape(matrices.shape), stretches.reshape(matrices.shape)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _newton_polar(matrices, rotations, regular):
     """Higham's scaled Newton iteration; leaves `regular` False where it does not apply."""
     inverse = np.empty((3, 3))

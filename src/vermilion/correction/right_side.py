@@ -7,9 +7,10 @@ which are no more precise, double for given ones; sums are always in double prec
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
+
+from vermilion.storage.kernels import kernel
 
 #: Frames that go together.
 LANES = 16
@@ -43,7 +44,7 @@ TURN_SERIES = {
 _MATHS = {"contract", "nsz", "arcp"}
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_MATHS, error_model="numpy")
+@kernel(nogil=True, fastmath=_MATHS, error_model="numpy")
 def accumulate(corners, row, weights, points, layers, series, limits, right):
     """right[i] += w (G - I) e for the edges e of every triangle.
 
@@ -101,7 +102,7 @@ def accumulate(corners, row, weights, points, layers, series, limits, right):
                 right[rc, k, f] += flow_ac + flow_bc
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def accumulate_mixture(corners, row, weights, points, basis, mixture, series, limits, right):
     """`accumulate` for layers `basis @ mixture`, which are made a tile at a time.
 
@@ -119,7 +120,7 @@ def accumulate_mixture(corners, row, weights, points, basis, mixture, series, li
         )
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def add_places(rows, basis, mixture, right):
     """right[rows[i]] += basis @ mixture, basis (N * 3, R) and mixture (R, LANES)."""
     made = np.dot(basis, mixture).reshape(len(rows), 3, LANES)
@@ -134,7 +135,7 @@ def turn_limits(dtype: np.dtype) -> np.ndarray:
     return np.array([2.0 / _LARGEST_TURN**2, 1.0], dtype=dtype)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def gather(frames, ids, points):
     """points[l, k, f] = frames[f, ids[l], k] less the first of the points; spare lanes repeat frame 0."""
     for f in range(LANES):
@@ -145,7 +146,7 @@ def gather(frames, ids, points):
                 points[i, k, f] = source[ids[i], k] - origin
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def add_frames(frames, ids, solution):
     """frames[f, ids[i], k] += solution[i, k, f]."""
     for i in range(len(ids)):

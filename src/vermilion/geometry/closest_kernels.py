@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
+from vermilion.storage.kernels import kernel
 
-@numba.njit(cache=True)
+
+@kernel()
 def closest_weights(  # pragma: no cover - compiled
     px: float, py: float, pz: float, abc: np.ndarray
 ) -> tuple[float, float, float]:
@@ -47,7 +48,7 @@ def closest_weights(  # pragma: no cover - compiled
     return va / total, vb / total, vc / total
 
 
-@numba.njit(cache=True)
+@kernel()
 def _box_distance(  # pragma: no cover - compiled
     px: float, py: float, pz: float, box: np.ndarray
 ) -> float:
@@ -58,7 +59,7 @@ def _box_distance(  # pragma: no cover - compiled
     return dx * dx + dy * dy + dz * dz
 
 
-@numba.njit(cache=True)
+@kernel()
 def _distance(  # pragma: no cover - compiled
     px: float, py: float, pz: float, u: float, v: float, w: float, abc: np.ndarray
 ) -> float:
@@ -69,7 +70,7 @@ def _distance(  # pragma: no cover - compiled
     return dx * dx + dy * dy + dz * dz
 
 
-@numba.njit(cache=True)
+@kernel()
 def search(  # pragma: no cover - compiled
     points: np.ndarray, boxes: np.ndarray, starts: np.ndarray, corners: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -114,7 +115,7 @@ def search(  # pragma: no cover - compiled
     return triangle, barycentric, distance
 
 
-@numba.njit(cache=True)
+@kernel()
 def closest_of(  # pragma: no cover - compiled
     points: np.ndarray, normals: np.ndarray, sides: np.ndarray, rows: np.ndarray,
     candidates: np.ndarray, corners: np.ndarray, face_normals: np.ndarray, face_sides: np.ndarray,
@@ -145,7 +146,7 @@ def closest_of(  # pragma: no cover - compiled
                 barycentric[row, 0], barycentric[row, 1], barycentric[row, 2] = u, v, w
 
 
-@numba.njit(cache=True)
+@kernel()
 def weights_of(  # pragma: no cover - compiled
     points: np.ndarray, corners: np.ndarray
 ) -> np.ndarray:

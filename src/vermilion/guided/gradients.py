@@ -6,10 +6,10 @@ sequences go through a compiled loop. A test holds the two together.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from vermilion.geometry.deformation_gradients import inverse_3x3, triangle_frames
+from vermilion.storage.kernels import kernel
 
 
 class NeutralTriangles:
@@ -41,7 +41,7 @@ class NeutralTriangles:
         return result.reshape(len(vertices), -1)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _gradients(vertices, triangles, inverse, result):
     """result[t] = [v2 - v1, v3 - v1, n / sqrt|n|] inverse[t]."""
     frame = np.empty((3, 3))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from vermilion.storage.kernels import kernel
 
-@numba.njit(cache=True)
+
+@kernel()
 def look_up(linear, table):  # pragma: no cover - compiled
     """`linear` (h, w, 3) float32 through a table of [0, 1], (h, w, 3) uint8; NaN is the first entry."""
     steps = np.float32(len(table) - 1)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import vertex_normals
 from vermilion.geometry.raycast import RayCaster
+from vermilion.storage.kernels import kernel
 
 _LIGHT = np.array([-0.35, -0.45, -0.82]) / np.linalg.norm([-0.35, -0.45, -0.82])
 _DISPLAY = np.array([255 * (i / 1023) ** (1 / 1.3) for i in range(1024)])
@@ -82,7 +82,7 @@ class ShadedMesh:
         return result
 
 
-@numba.njit(cache=True)
+@kernel()
 def _shade(  # pragma: no cover - compiled
     triangle, barycentric, directions, triangles, normals, colours, opacity, out
 ):

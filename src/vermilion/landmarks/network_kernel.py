@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from vermilion.storage.kernels import kernel
 
-@numba.njit(cache=True)
+
+@kernel()
 def encode(pixels, curve, gain, offset, planes):
     """Planes (3, h, w) = gain * curve(pixels (h, w, 3)) + offset in one pass."""
     steps = np.float32(len(curve) - 2)

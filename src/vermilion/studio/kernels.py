@@ -8,19 +8,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from vermilion.storage.kernels import kernel
 
 SKIN, MOUTH, TEETH, EYE = 0, 1, 2, 3
 MASK = 63  # noise volumes are 64 cells wide
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _smoothstep(low, high, value):
     t = min(max((value - low) / (high - low), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _noise(volume, x, y, z):
     """Trilinear value of the tiling volume, cells as unit."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
@@ -34,7 +35,7 @@ def _noise(volume, x, y, z):
     return (a * (1 - ty) + b * ty) * (1 - tx) + (c * (1 - ty) + d * ty) * tx
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _octave(volume, x, y, z, cell, footprint, turn):
     """Noise of blobs some three cells wide, faded out where a pixel is too wide for it."""
     fade = math.exp(-0.35 * (footprint / cell) ** 2)
@@ -46,7 +47,7 @@ def _octave(volume, x, y, z, cell, footprint, turn):
     return fade * _noise(volume, u * s, v * s, (z + 0.37 * turn * x) * s)
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _brow(x, y, brows):
     """Distance in mm to the nearer brow's line, relative to its half width there."""
     best = 1e9
@@ -64,7 +65,7 @@ def _brow(x, y, brows):
     return best
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _skin_albedo(out, volume, look, brows, chin, p, lip, inside, footprint):
     x, y, z = p[0] + look.shift_mm[0], p[1] + look.shift_mm[1], p[2] + look.shift_mm[2]
     coarse = _octave(volume, x, y, z, 7.0, footprint, 1.0)
@@ -124,7 +125,7 @@ def _skin_albedo(out, volume, look, brows, chin, p, lip, inside, footprint):
     out[0], out[1], out[2] = max(r, 0.004), max(gr, 0.004), max(b, 0.004)
 
 
-@njit(cache=True, fastmath=True)
+@kernel(fastmath=True)
 def _eye_albedo(out, volume, look, p):
     radius = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) + 1e-6
     angle = math.acos(min(max(p[2] / radius, -1.0), 1.0))
@@ -143,7 +144,7 @@ def _eye_albedo(out, volume, look, p):
             out[c] = out[c] * (1.0 - limbus) * (0.4 + 0.6 * (1 - limbus)) + ring * limbus
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@kernel(fastmath=True, nogil=True)
 def shade_hits(
     out,
     triangle,

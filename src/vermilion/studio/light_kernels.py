@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from vermilion.storage.kernels import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def sky_rays(points, normals, vertices, directions, offset, origins_out, directions_out, owner_out):
     """Fill the rays of every vertex's upper hemisphere; returns how many there are."""
     count = 0
@@ -30,7 +30,7 @@ def sky_rays(points, normals, vertices, directions, offset, origins_out, directi
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def light_rays(points, normals, vertices, targets, offset, origins_out, directions_out, owner_out):
     """Rays from every vertex to the points (L, S, 3) on the lights; returns how many."""
     count = 0
@@ -53,7 +53,7 @@ def light_rays(points, normals, vertices, targets, offset, origins_out, directio
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def gather_sky(owner, blocked, normals, directions, colours, out):
     """Add the light (D, 3) of directions not blocked, times the cosine, to `out` (V, 3)."""
     for i in range(len(owner)):

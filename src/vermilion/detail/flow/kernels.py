@@ -6,8 +6,9 @@ has a place in each of six images: x plus a sum of flows. A data term compares t
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from vermilion.storage.kernels import kernel
 
 #: For each image (synthetic and true at t, t + 1, t - 1): the flows whose sum leads from x to it.
 PLACES = np.array(
@@ -26,7 +27,7 @@ TERMS = np.array([[0, 1], [2, 3], [4, 5], [0, 2], [0, 4], [1, 3], [1, 5]])
 _N = 18
 
 
-@numba.njit(cache=True, fastmath=True, error_model="numpy")
+@kernel(fastmath=True, error_model="numpy")
 def _sample(maps, x, y, out):
     """All channels of (h, w, C) at (x, y) in pixel indices, bilinear; False outside."""
     height, width = maps.shape[:2]
@@ -45,7 +46,7 @@ def _sample(maps, x, y, out):
     return True
 
 
-@numba.njit(cache=True, fastmath=True, error_model="numpy")
+@kernel(fastmath=True, error_model="numpy")
 def assemble(images, masks, flows, places, terms, gradient_weight, epsilon, system, right):
     """Linearise the data terms of Mono13 eq. 9 about `flows` (lagged robust weights).
 
@@ -86,7 +87,7 @@ def assemble(images, masks, flows, places, terms, gradient_weight, epsilon, syst
                 )
 
 
-@numba.njit(cache=True, fastmath=True, error_model="numpy")
+@kernel(fastmath=True, error_model="numpy")
 def _term(of_i, of_j, place_i, place_j, gradient_weight, epsilon, pair, a, b):
     """Add |f_j(place j) - f_i(place i)|, of colours and of their gradients, to a pixel's system."""
     for kind in range(2):
@@ -132,7 +133,7 @@ def _term(of_i, of_j, place_i, place_j, gradient_weight, epsilon, pair, a, b):
                         )
 
 
-@numba.njit(cache=True, fastmath=True, error_model="numpy")
+@kernel(fastmath=True, error_model="numpy")
 def edge_weights(flow, direction, alpha, scale, edges):
     """Weights of the four edges (east, south, south-east, south-west) of each pixel (Mono13 eq. 11).
 
@@ -182,7 +183,7 @@ def edge_weights(flow, direction, alpha, scale, edges):
                     edges[y, x, e] = max(-mixed, np.float32(0))
 
 
-@numba.njit(cache=True, fastmath=True, error_model="numpy")
+@kernel(fastmath=True, error_model="numpy")
 def relax(system, right, flows, step, edges, similarity, omega):
     """One sweep of successive over-relaxation over the increments `step` (h, w, 5, 2), in place.
 
