@@ -121,9 +121,7 @@ class LayerIntegrator:
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = layers[part]
             frames_last[..., : len(given)] = np.transpose(given, (1, 2, 0))
-            accumulate(
-                *self._triangles(points), frames_last, *_series(points.dtype), right
-            )
+            accumulate(*self._triangles(points), frames_last, *_series(points.dtype), right)
             if len(self.places):
                 wanted = np.transpose(moved[part][:, self.places], (1, 2, 0))
                 rows = self._row[self.places]
@@ -154,9 +152,7 @@ class LayerIntegrator:
         def add_to(right: np.ndarray, points: np.ndarray, part: slice) -> None:
             given = mixture[part]
             lanes[:, : len(given)] = given.T
-            accumulate_mixture(
-                *self._triangles(points), basis, lanes, *_series(basis.dtype), right
-            )
+            accumulate_mixture(*self._triangles(points), basis, lanes, *_series(basis.dtype), right)
             if len(self.places):
                 add_places(self._row[self.places], place_basis, lanes, right)
 
