@@ -16,7 +16,7 @@ from pathlib import Path
 #: A shape: (N, 3), (V,), (..., T, 9), (h, w, 3), (T * 9,), (6 + K,), "scalar"
 _SHAPE = r"\((?:\.\.\.|[\w' +*/-]+)(?:,\s*(?:\.\.\.|[\w' +*/-]*))+\)"
 #: Compiled kernels describe their arrays in the module's text.
-_KERNELS = {"njit", "jit", "guvectorize", "vectorize"}
+_KERNELS = {"kernel", "njit", "jit", "guvectorize", "vectorize"}
 
 
 def takes_array(annotation: ast.expr | None) -> bool:

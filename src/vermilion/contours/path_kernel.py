@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from vermilion.storage.kernels import kernel
 
-@numba.njit(cache=True)
+
+@kernel()
 def cheapest_totals(
     totals: np.ndarray, smoothness: np.ndarray, origin: np.ndarray
 ) -> None:  # pragma: no cover - compiled
