@@ -17,7 +17,7 @@ from vermilion.external.read import read_tracked
 from vermilion.external.sequence import Request
 from vermilion.storage.errors import InputError
 
-COUNT, MODES = 24, 10
+COUNT, MODES = 16, 10
 FRAMES = np.arange(100, 100 + COUNT)
 
 

@@ -65,7 +65,7 @@ def scene(noise_px=3.0):
 def fitted():
     model, problem, images = scene()
     settings = IdentityImageSettings(
-        spacing_mm=4.0, pixel_mm=2.0, strength=1000.0, albedo_prior=0.05
+        spacing_mm=5.0, pixel_mm=2.0, strength=1000.0, albedo_prior=0.05
     )
     joint = fit_joint_identity(model, problem, images, [CAMERA] * N_FRAMES, settings)
     return model, problem, joint
