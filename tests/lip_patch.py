@@ -112,7 +112,7 @@ def albedo(tattoo: bool, seed: int = 5) -> np.ndarray:
 def render(
     model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float = 1.0
 ) -> np.ndarray:
-    """Linear image (h, w, 3): diffuse light, dark behind the mouth opening; 9 rays a pixel."""
+    """Linear image (h, w, 3): diffuse light, dark behind the mouth opening; 16 rays a pixel."""
     lens = (camera.model, camera.params, camera.width_px, camera.height_px)
     key = (vertices.tobytes(), *lens, camera.cam_from_world.tobytes(), tattoo, light)
     if key not in _RENDERED:
@@ -127,7 +127,7 @@ _RENDERED: dict[tuple, np.ndarray] = {}
 def _render(
     model: FaceModel, vertices: np.ndarray, camera: Camera, tattoo: bool, light: float
 ) -> np.ndarray:
-    over = 3
+    over = 4
     size = (camera.width_px, camera.height_px)
     x, y = np.meshgrid(*(np.arange(n * over) + 0.5 for n in size))
     caster = RayCaster(vertices, model.triangles)
