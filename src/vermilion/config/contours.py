@@ -134,6 +134,14 @@ class ContourDetectorConfig(StageConfig):
         description="Where the lips of dense landmarks are the start: what the dark line between a lip and "
         "the teeth counts as an edge (share of the strongest).",
     )
+    lips_colours: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="`track`, where the lips of dense landmarks are the start: what the colours of lips and of the "
+        "mouth's inside in all frames of the take count for the inner border, against those of the frame "
+        "alone (share); 0 does not learn them.",
+    )
     edge_weight: float = Field(
         4.0,
         ge=0,

@@ -19,24 +19,30 @@ from vermilion.contours.curves import (
     CURVE_POINTS,
     loop_spline,
     outward_normals,
-    sampled,
     smoothed_halves,
     smoothed_ring,
     without_crossing,
 )
 from vermilion.contours.lip_planes import BESIDE
+from vermilion.contours.mouth_colours import learn_lip_odds, lip_odds, not_lip, to_colours
+from vermilion.contours.outer_edges import (
+    STEP_PX,
+    discriminants,
+    edge_strength,
+    normalised_strength,
+    unwrapped,
+)
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion, usable
 from vermilion.contours.ridges import SEARCHES, RidgeDetector, blurred_colours, inner_cues
 from vermilion.storage.errors import InputError
 from vermilion.storage.progress import progress
 
-STEP_PX = 0.5
-#: Deviation along the contour of what is learnt together (share of the ring).
-ALONG = 3 / 80
-LEAST_SPREAD = 0.02  # of a colour about its mean
 ROUNDS, INNER_ROUNDS = 6, 2
 NEARLY = 0.01  # a part moved as a whole meets its border so nearly, per inter-ocular distance
+COLOURS_REACH = (
+    1.5  # per the reach: what starts where the take's colours say may be looked for farther
+)
 EDGE_PASSES = 6  # binomial passes over the tracked rings, whose edges are the mesh's
 
 
@@ -52,6 +58,8 @@ class TrackRidgeDetector(RidgeDetector):
         direction, middle: (n, 3) and (n,): a colour c at sample k is lip where
             direction[k] . c > middle[k].
         inner_offset: (m,) as `outer_offset`, of the inner border.
+        lips_colours: what the take's colours count for the inner border, against those of a frame.
+        lip_odds: (2, C, C, C) these colours, as of `learn_lip_odds`; (0,): not known.
     """
 
     kind = "track"
@@ -64,6 +72,8 @@ class TrackRidgeDetector(RidgeDetector):
     direction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     middle: np.ndarray = field(default_factory=lambda: np.zeros(0))
     inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    lips_colours: float = 0.5
+    lip_odds: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
@@ -125,17 +135,25 @@ class TrackRidgeDetector(RidgeDetector):
         self, colours: np.ndarray, region: MouthRegion, outer: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Inner border (m, 2) px and how clear it is (m,); `colours` (3, size, size), `outer` (m, 2) px."""
-        reach = self.reach * self.interocular_size_px
+        size = self.interocular_size_px
+        reach = self.reach * size
         curve = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(self.inner_offset))
-        curve = curve + self.interocular_size_px * self.inner_offset[:, None] * outward_normals(
-            curve
-        )
+        curve = curve + size * self.inner_offset[:, None] * outward_normals(curve)
+        odds = lip_odds(self.lip_odds, colours) if len(self.lip_odds) else None
+        if odds is not None:
+            reach *= COLOURS_REACH
         start, strength = curve, np.zeros(len(curve))
         for search in SEARCHES:
             cues, strange = inner_cues(colours, outer, curve, search)
             if search is SEARCHES[0]:
-                start = curve = self.to_holes(curve, cues, search.step_px)
+                start = self.to_holes(curve, cues, search.step_px)
+                if odds is not None:
+                    planes = cues.lightness, cues.flesh, cues.lip
+                    start = to_colours(start, odds, planes, size, search.step_px)
+                curve = start
                 cues, strange = inner_cues(colours, outer, curve, search)
+            if odds is not None:
+                strange = strange + self.lips_colours * (not_lip(odds, curve) - strange)
             curve, strength = self.fit_border(
                 curve if search.inner_reach < 1 else start,
                 strange,
@@ -213,79 +231,48 @@ def learn_borders(
     within = slice(more, -more)
     seen = np.stack([unwrapped(*pair, places) for pair in zip(colours, rings, strict=True)])
     offset = np.zeros(len(rings[0]))
-    direction, middle = _discriminants(seen, places, offset, beside)
+    direction, middle = discriminants(seen, places, offset, beside)
     for _ in range(ROUNDS):
         fall = normalised_strength(edge_strength(seen, direction, middle).mean(axis=0)[:, within])
         cost = (places[within] / (reach * size)) ** 2 - detector.edge_weight * fall
         chosen = cheapest_ring(cost, step_cost(rings[0], STEP_PX, detector.stiffness))
         offset = smoothed_ring(places[within][chosen], 2)
-        direction, middle = _discriminants(seen, places, offset, beside)
+        direction, middle = discriminants(seen, places, offset, beside)
     detector = replace(
         detector,
         outer_offset=offset / size, direction=direction, middle=middle, inner_offset=np.zeros(CURVE_POINTS),
     )  # fmt: skip
-    for _ in range(INNER_ROUNDS if inner else 0):
-        found = []
-        for planes, region in zip(colours, regions, strict=True):
-            outer = loop_spline(detector.outer_border(planes, region)[0])
-            tracked = loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES), len(outer))
-            moved = detector.inner_border(planes, region, outer)[0] - tracked
-            found.append((moved * outward_normals(tracked)).sum(axis=1))
+    outer = [
+        loop_spline(detector.outer_border(*pair)[0]) for pair in zip(colours, regions, strict=True)
+    ]
+    return _learn_inner(detector, colours, regions, outer, inner)
+
+
+def _learn_inner(
+    detector: TrackRidgeDetector,
+    colours: Sequence[np.ndarray],
+    regions: Sequence[MouthRegion],
+    outer: Sequence[np.ndarray],
+    off_by_the_same: bool,
+) -> TrackRidgeDetector:
+    """The detector with what frames tell of the inner border; `colours` (3, size, size), `outer` (m, 2) px."""
+    size = detector.interocular_size_px
+
+    def borders() -> list[np.ndarray]:
+        frames = zip(colours, regions, outer, strict=True)
+        return [detector.inner_border(*frame)[0] for frame in frames]
+
+    if not off_by_the_same:
+        if not detector.lips_colours:
+            return detector
+        return replace(detector, lip_odds=learn_lip_odds(colours, outer, borders(), size))
+    tracked = [loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES)) for region in regions]
+    for _ in range(INNER_ROUNDS):
+        moved = [
+            ((found - ring) * outward_normals(ring)).sum(axis=1)
+            for found, ring in zip(borders(), tracked, strict=True)
+        ]
         detector = replace(
-            detector, inner_offset=smoothed_ring(np.median(found, axis=0), 20) / size
+            detector, inner_offset=smoothed_ring(np.median(moved, axis=0), 20) / size
         )
     return detector
-
-
-def unwrapped(colours: np.ndarray, ring: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """`colours` (3, h, w) at `places` (T,) or (n, T) px outwards from a `ring` (n, 2) px: (n, T, 3)."""
-    places = np.broadcast_to(places, (len(ring), np.shape(places)[-1]))
-    points = ring[:, None] + places[..., None] * outward_normals(ring)[:, None]
-    return np.stack([sampled(plane, points) for plane in colours], axis=-1)
-
-
-def edge_strength(seen: np.ndarray, direction: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """How steeply the probability of lip falls outwards, (F, n, T) a pixel.
-
-    Args:
-        seen: (F, n, T, 3) colours along the normals.
-        direction, middle: (n, 3), (n,) discriminants, as of `TrackRidgeDetector`.
-    """
-    log_odds = np.einsum("fntc,nc->fnt", seen, direction) - middle[None, :, None]
-    lip = 1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30)))
-    return np.maximum(-np.gradient(lip, STEP_PX, axis=2), 0.0)
-
-
-def normalised_strength(fall: np.ndarray) -> np.ndarray:
-    """Strengths `fall` (n, T) in [0, 1]: a quarter of the ring is as clear as can be."""
-    return np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
-
-
-def _discriminants(
-    seen: np.ndarray, places: np.ndarray, offset: np.ndarray, beside: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Linear discriminant of lip and skin at each sample: directions (n, 3) and middles (n,).
-
-    Args:
-        seen: (F, n, T, 3) colours at `places` (T,) from the ring.
-        offset: (n,) of the border from the ring.
-        beside: from where to where colours count, to either side of the border; as `places`.
-    """
-    away = places - offset[:, None]
-    means, covariances = [], []
-    for side in (-away, away):
-        counts = ((side > beside[0]) & (side < beside[1])).astype(float)
-        total = _along(len(seen) * counts.sum(axis=1))
-        mean = _along(np.einsum("fntc,nt->nc", seen, counts)) / total[:, None]
-        square = _along(np.einsum("fntc,fntd,nt->ncd", seen, seen, counts))
-        means.append(mean)
-        covariances.append(square / total[:, None, None] - mean[:, :, None] * mean[:, None])
-    shared = 0.5 * (covariances[0] + covariances[1]) + LEAST_SPREAD**2 * np.eye(3)
-    lip, skin = means
-    direction = np.linalg.solve(shared, (lip - skin)[..., None])[..., 0]
-    return direction, (0.5 * (lip + skin) * direction).sum(axis=1)
-
-
-def _along(values: np.ndarray) -> np.ndarray:
-    """Sums (n, ...) with those of the neighbours on the ring."""
-    return gaussian_filter1d(values, ALONG * len(values), axis=0, mode="wrap")

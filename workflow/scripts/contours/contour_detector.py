@@ -44,7 +44,7 @@ def from_track(cfg, camera, source, track, rings, dense):
     landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector.of(
         cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach,
-        lips_shade=cfg.lips_shade if dense else 0.0,
+        lips_shade=cfg.lips_shade if dense else 0.0, lips_colours=cfg.lips_colours,
     )  # fmt: skip
     return learn_from_take(
         detector,
