@@ -40,9 +40,10 @@ LEAST_SAMPLES, LEAST_FRAMES = 30, 2
 BAND = (0.12, 0.85)
 INSIDE_PX = 2.0  # so far inside the inner border all is mouth
 OPEN = 0.09  # narrower openings tell nothing of the mouth's inside: per inter-ocular distance
-#: How far inside and outside its start the border is looked for, and how far it costs as much as the
+#: How far inside and outside its start the border is looked for (networks draw mouths too wide; beyond
+#: `SLACK_PX` outwards, a lip's dark shade would be taken for mouth), and how far it costs as much as the
 #: clearest edge: per inter-ocular distance.
-REACH, USUAL = (0.16, 0.04), 0.10
+REACH, USUAL = (0.16, 0.015), 0.10
 ODDS_WEIGHT = 0.25  # of a pixel's odds, against `USUAL`
 STIFFNESS = (
     1.5  # as `contours.detector.stiffness`: a rounded mouth has another shape than the network's
