@@ -40,14 +40,12 @@ LEAST_SAMPLES, LEAST_FRAMES = 30, 2
 BAND = (0.12, 0.85)
 INSIDE_PX = 2.0  # so far inside the inner border all is mouth
 OPEN = 0.09  # narrower openings tell nothing of the mouth's inside: per inter-ocular distance
-#: How far inside and outside its start the border is looked for (networks draw mouths too wide; beyond
-#: `SLACK_PX` outwards, a lip's dark shade would be taken for mouth), and how far it costs as much as the
+#: How far inside and outside its start the border is looked for, and how far it costs as much as the
 #: clearest edge: per inter-ocular distance.
-REACH, USUAL = (0.16, 0.015), 0.10
+REACH, USUAL = (0.16, 0.04), 0.10
+SHADE = 0.9  # per the lips' lightness: outside its start, what is darker may be a lip's own shade
 ODDS_WEIGHT = 0.25  # of a pixel's odds, against `USUAL`
-STIFFNESS = (
-    1.5  # as `contours.detector.stiffness`: a rounded mouth has another shape than the network's
-)
+STIFFNESS = 1.5  # as of `contours.detector`: a rounded mouth has another shape than the network's
 SLACK_PX = 3.0  # single edges, not colours, tell the border to this; they are looked for from there
 
 
@@ -143,6 +141,9 @@ def to_colours(
     seen = np.concatenate([
         sampled(plane, part) for plane, part in zip(odds, (points[:half], points[half:]), strict=True)
     ])  # fmt: skip
+    if (lips := (lip > 0.5) & (flesh > 0.5)).any():
+        shade = (places > 0) & (light < SHADE * np.median(light[lips]))
+        seen = np.where(shade, np.maximum(seen, 0.0), seen)
     behind = creases(light, flesh > 0.5, lip > 0.5, step_px)[1]
     beyond_middle = -places[None] > np.maximum(0.5 * across, INSIDE_PX)[:, None]
     seen = np.where((lip > 0.5) & ~beyond_middle, (1 - behind) * seen - behind, 0.0)
