@@ -97,4 +97,6 @@ def test_share_0_learns_nothing():
 
 def test_the_file_has_the_colours(detector, tmp_path):
     detector.save(tmp_path / "detector.npz")
-    np.testing.assert_array_equal(load_detector(tmp_path / "detector.npz").lip_odds, detector.lip_odds)
+    np.testing.assert_array_equal(
+        load_detector(tmp_path / "detector.npz").lip_odds, detector.lip_odds
+    )
