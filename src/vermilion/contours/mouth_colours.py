@@ -74,7 +74,9 @@ def learn_lip_odds(
         outer, inner: borders found by single frames, (n, 2) px; the upper lip is the first half.
         interocular_px: inter-ocular distance in the regions.
     """
-    upper, lower, mouth = [], [], []
+    upper: list[np.ndarray] = []
+    lower: list[np.ndarray] = []
+    mouth: list[np.ndarray] = []
     for planes, around, opening in zip(colours, outer, inner, strict=True):
         inside, to_outer = inside_and_distance(around, planes.shape[1])
         within, to_inner = inside_and_distance(opening, planes.shape[1])
