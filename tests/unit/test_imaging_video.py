@@ -11,6 +11,7 @@ import pytest
 from av.video.reformatter import Colorspace
 
 from tests.unit.small_videos import HEIGHT, WIDTH, mean_difference, scene, write_clip
+from vermilion.capture.video_facts import field_warning, load_video_facts, video_facts
 from vermilion.imaging.colour import colour_of_frame
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import srgb_to_linear
@@ -99,6 +100,17 @@ def test_interlaced_frames_become_images_of_their_first_field(tmp_path):
         assert combed < 0.6 * mean_difference(
             interlaced()[frame][:40:2], interlaced()[frame][1:41:2]
         )
+
+
+def test_interlaced_video_is_said_with_the_command_for_both_moments(tmp_path):
+    facts = video_facts(write_interlaced(tmp_path / "a.mp4"))
+    facts.save(tmp_path / "facts.json")
+    assert load_video_facts(tmp_path / "facts.json").interlaced
+    assert "half the lines" in field_warning(facts)
+    assert "ffmpeg -i a.mp4 -vf bwdif=mode=send_field" in field_warning(facts)
+    progressive = video_facts(write_clip(tmp_path / "b.mp4", SCENES[:3], tags=BT709))
+    assert not progressive.interlaced
+    assert field_warning(progressive) == ""
 
 
 @pytest.mark.parametrize(

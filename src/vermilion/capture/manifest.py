@@ -11,7 +11,7 @@ from pathlib import Path
 
 from vermilion.capture.camera_files.read import read_given_cameras
 from vermilion.capture.checks import check_image, header_size
-from vermilion.capture.video_facts import VideoFacts, rate_warning, video_facts
+from vermilion.capture.video_facts import VideoFacts, field_warning, rate_warning, video_facts
 from vermilion.imaging.frames import list_frames, reading_of
 from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
 from vermilion.imaging.source import Source, folder_of, is_video, source_path
@@ -108,8 +108,8 @@ def capture_manifest(
     if is_video(source):
         facts = video or video_facts(source)
         manifest = _video_manifest(source, subject, take, frames, cameras, hash_decoded, facts)
-        warning = "" if fps is None else rate_warning(facts, fps)
-        return replace(manifest, warnings=[warning] if warning else [])
+        found = field_warning(facts), "" if fps is None else rate_warning(facts, fps)
+        return replace(manifest, warnings=[warning for warning in found if warning])
     rig = source / "frames"
     kind = "capture" if rig.is_dir() else "frames"
     folders = (

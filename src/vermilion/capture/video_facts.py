@@ -14,7 +14,7 @@ from vermilion.storage.files import sha256_of, write_text
 from vermilion.storage.json_files import load_json
 
 if TYPE_CHECKING:
-    from vermilion.imaging.video import VideoIndex
+    from vermilion.imaging.video import VideoIndex, VideoReader
 
 FORMAT_VERSION = 1
 #: Part of the median interval by which intervals of an even video may differ (rounded time stamps).
@@ -33,6 +33,7 @@ class VideoFacts:
         fps: frames a second, on average.
         seconds_per_tick: of the time stamps.
         stamps, keys: see `VideoIndex`.
+        interlaced: whether two moments stand in the lines of a frame.
     """
 
     file: str
@@ -42,6 +43,7 @@ class VideoFacts:
     seconds_per_tick: float
     stamps: tuple[int, ...]
     keys: tuple[int, ...]
+    interlaced: bool = False
 
     @property
     def index(self) -> VideoIndex:
@@ -64,6 +66,7 @@ class VideoFacts:
             "frames": len(self.stamps),
             "fps": self.fps,
             "even": _is_even(self.times_s),
+            "interlaced": self.interlaced,
         }
 
     def save(self, path: str | Path) -> None:
@@ -86,6 +89,7 @@ def video_facts(path: str | Path) -> VideoFacts:
         reader.seconds_per_tick,
         reader.index.stamps,
         reader.index.keys,
+        _is_interlaced(reader),
     )
 
 
@@ -120,6 +124,17 @@ def uneven_times(path: str | Path | None, frames: np.ndarray) -> np.ndarray | No
     return None if _is_even(times) else times[np.asarray(frames, dtype=np.int64)]
 
 
+def field_warning(facts: VideoFacts) -> str:
+    """What becomes of interlaced frames; empty where there are none."""
+    if not facts.interlaced:
+        return ""
+    return (
+        "interlaced, two moments in the lines of each frame: a frame becomes the image of its first field, which has "
+        "half the lines, so that small lips are less exact; where both moments are wanted, convert with "
+        f"`ffmpeg -i {facts.file} -vf bwdif=mode=send_field -crf 12 progressive.mp4` and set twice the rate"
+    )
+
+
 def rate_warning(facts: VideoFacts, sheet_fps: float) -> str:
     """What differs between the file's rate and the take sheet's; empty where nothing does."""
     steps, sheet = np.diff(facts.times_s), f"the take sheet says {sheet_fps:g}"
@@ -135,6 +150,17 @@ def rate_warning(facts: VideoFacts, sheet_fps: float) -> str:
     if abs(facts.fps - sheet_fps) > _SAME_RATE * sheet_fps:
         return f"the file has {facts.fps:.4g} frames a second, {sheet}: correct `fps`"
     return ""
+
+
+def _is_interlaced(reader: VideoReader) -> bool:
+    """Of the first frame that can be read among some; a take that has none is refused where it is read."""
+    for frame in range(0, reader.n_frames, max(reader.n_frames // 4, 1)):
+        try:
+            reader.read(frame)
+        except InputError:
+            continue
+        return reader.interlaced
+    return False
 
 
 def _is_even(times_s: np.ndarray) -> bool:

@@ -86,7 +86,7 @@ class VideoReader:
         self._next = -1
         self._kept: dict[int, av.VideoFrame] = {}
         self._presentation: Presentation | None = None
-        self._interlaced = False
+        self.interlaced = False
 
     @property
     def n_frames(self) -> int:
@@ -131,10 +131,10 @@ class VideoReader:
                 **place,
             )
         presentation = self._presented(frame)
-        if self._interlaced and frame > 0:  # read in order, so that nothing is decoded twice
+        if self.interlaced and frame > 0:  # read in order, so that nothing is decoded twice
             self._neighbour(frame - 1)
         decoded = self._decoded(frame, place)
-        self._interlaced = decoded.interlaced_frame
+        self.interlaced = decoded.interlaced_frame
         if decoded.interlaced_frame:
             decoded = deinterlace(self._neighbour(frame - 1), decoded, self._neighbour(frame + 1))
         return presentation.image(decoded)
