@@ -168,7 +168,7 @@ tracking:{person}
 
 correction:
   # Contours that start from these landmarks are good: the lips follow them closely.
-  image: {{contour_weight: 10.0, bending_mm: 10.0}}
+  image: {{contour_weight: 10.0}}
 
 apply:
   # `regressor: none` lets the lips follow the contours in the image; `model: FILE.h5` names a trained
