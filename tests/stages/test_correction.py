@@ -160,7 +160,7 @@ def run_train(root, regressor):
         output={
             "model": root / f"models/{regressor}.h5",
             "curve": root / f"models/{regressor}.cv.tsv",
-            "image": root / f"models/{regressor}.cv.svg",
+            "image": root / f"models/{regressor}.cv.png",
         },
     )
 

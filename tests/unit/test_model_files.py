@@ -14,7 +14,7 @@ from vermilion.geometry.mesh import topology_hash
 from vermilion.regression.estimators import AffineRegressor, RBFNetwork
 from vermilion.regression.kernel import KernelRegressor
 from vermilion.regression.model import FORMAT_VERSION, LipModel, load_model, save_model
-from vermilion.regression.training import Selection, curve_rows, train
+from vermilion.regression.training import Selection, curve_table, train
 from vermilion.storage.errors import InputError, ModelFileError
 
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])
@@ -253,9 +253,9 @@ def test_training_chooses_writes_and_reads(database, tmp_path):
         np.testing.assert_allclose(
             (mixture @ layers).reshape(38, 3, 9), read.predict(data.features, neutral(1)), atol=1e-5
         )
-        rows = curve_rows(name, curve)
-        assert sum(row["chosen"] for row in rows) == 1
-        assert len(rows) == curve.mean.size
+        table = curve_table(name, curve)
+        assert table["chosen"].sum() == 1
+        assert len(table) == curve.mean.size
 
 
 def test_what_all_frames_of_a_person_have_in_common_changes_nothing(database):

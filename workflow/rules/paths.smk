@@ -164,7 +164,7 @@ class P:
     generic_database = R + "/database/generic.h5"
     model = R + "/models/{regressor}.h5"
     validation_table = R + "/models/{regressor}.cv.tsv"
-    validation_curve = R + "/models/{regressor}.cv.svg"
+    validation_curve = R + "/models/{regressor}.cv.png"
 
     # evaluation
     evaluated = _EVALUATION + "/takes/{subject}/{take}"

@@ -29,10 +29,8 @@ from vermilion.contours.paths import cheapest_ring, step_cost
 CELLS = 28
 LOW, HIGH = (0.0, -0.15, -0.35), (1.0, 0.75, 0.65)
 DARKEST = 0.06  # added to the lightness that colours are divided by
-CELL_BLUR, FLOOR = (
-    1.3,
-    7e-5,
-)  # deviation of the tables' blur (cells), and the share that any cell has
+CELL_BLUR = 1.3  # deviation of the tables' blur (cells)
+FLOOR = 7e-5  # the share that any cell has
 MOST_ODDS = 1.5  # a colour alone says no more: logarithm of the odds of lip against mouth
 SAMPLES = 400  # of a frame and kind, so that every frame counts alike
 LEAST_SAMPLES, LEAST_FRAMES = 30, 2

@@ -40,9 +40,7 @@ from vermilion.storage.progress import progress
 
 ROUNDS, INNER_ROUNDS = 6, 2
 NEARLY = 0.01  # a part moved as a whole meets its border so nearly, per inter-ocular distance
-COLOURS_REACH = (
-    1.5  # per the reach: what starts where the take's colours say may be looked for farther
-)
+COLOURS_REACH = 1.5  # per the reach: the take's colours tell where to look, not how exactly
 EDGE_PASSES = 6  # binomial passes over the tracked rings, whose edges are the mesh's
 
 

@@ -76,9 +76,8 @@ def _newton_polar(matrices, rotations, regular):
     inverse = np.empty((3, 3))
     for index in range(matrices.shape[0]):
         x = rotations[index]
-        for i in range(
-            3
-        ):  # numba compiles an assignment of arrays for seconds: it may have to say what fails
+        # numba compiles an assignment of arrays for seconds: it may have to say what fails.
+        for i in range(3):
             for c in range(3):
                 x[i, c] = matrices[index, i, c]
         for step in range(30):

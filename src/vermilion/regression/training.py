@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from vermilion.regression.model import DISPLACEMENT_UNIT_MM, LipModel
 from vermilion.regression.ridge import person_averages
 from vermilion.regression.training_set import TrainingSet
 from vermilion.storage.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Fewer people tell nothing of unseen subjects: folds of GR are then clips, as those of PS and MS.
 LEAST_PEOPLE = 3
@@ -222,11 +225,13 @@ def _shifts(data: TrainingSet, selection: Selection) -> tuple[np.ndarray, np.nda
     return np.array([known.get(subject, mean) - mean for subject in data.subjects]), mean
 
 
-def curve_rows(name: str, curve: Curve, choice: Rule = "simplest") -> list[dict[str, object]]:
-    """The cross-validation curve for the report: a row a grid point."""
+def curve_table(name: str, curve: Curve, choice: Rule = "simplest") -> pd.DataFrame:
+    """The cross-validation curve, one row a grid point, for the report."""
+    import pandas as pd
+
     mean, deviation = curve.mean, curve.standard_error
     chosen = curve.choose(choice)
-    return [
+    rows = [
         {
             "regressor": name,
             "alpha": alpha,
@@ -241,3 +246,4 @@ def curve_rows(name: str, curve: Curve, choice: Rule = "simplest") -> list[dict[
         for i, beta in enumerate(curve.betas)
         for j, alpha in enumerate(curve.alphas)
     ]
+    return pd.DataFrame(rows)

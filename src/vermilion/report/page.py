@@ -184,8 +184,6 @@ def image(path: str | Path, caption: str, folder: str | Path | None = None) -> s
     path = Path(path)
     link = None if folder is None else Path(os.path.relpath(path, folder)).as_posix()
     content = path.read_bytes()
-    if path.suffix == ".svg":
-        return embedded(content, "svg+xml", caption, link)
     if len(content) <= _LARGE_BYTES:
         return embedded(content, "png", caption, link)
     pixels = cv2.imread(str(path))
@@ -207,7 +205,7 @@ def jpeg(pixels: np.ndarray, quality: int) -> bytes:
 
 
 def embedded(content: bytes, kind: str, caption: str, link: str | None = None) -> str:
-    """The bytes of an image file (`kind` png, jpeg, webp or svg+xml) as a figure that leads to `link`."""
+    """The bytes of an image file (`kind` png, jpeg or webp) as a figure that leads to `link`."""
     encoded = base64.b64encode(content).decode("ascii")
     shown = f'<img alt="{text(caption)}" src="data:image/{kind};base64,{encoded}">'
     if link is not None:

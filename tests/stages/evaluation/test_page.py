@@ -193,7 +193,7 @@ def write_page(root, ev):
             "quality": root / "quality.tsv",
             **{name: [ev / file] for name, file in SHEETS.items()},
             "reconstructions": [root / "takes/ana/rom/multiview/report.html"],
-            "training": [root / "models/MS.cv.svg"],
+            "training": [root / "models/MS.cv.png"],
             "overlays": [overlay],
             "videos": [],
             "timelines": [],

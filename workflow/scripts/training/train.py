@@ -5,7 +5,7 @@ from vermilion.config.training import TrainingConfig
 from vermilion.database.read import LipDatabase
 from vermilion.provenance.begun_run import begin_job
 from vermilion.regression.model import save_model
-from vermilion.regression.training import Selection, curve_rows, train
+from vermilion.regression.training import Selection, curve_table, train
 from vermilion.report.cross_validation import plot_curve
 from vermilion.storage.tables import write_table
 
@@ -20,9 +20,9 @@ def main(snakemake):
             database.vertices,
         )  # fmt: skip
     model, curve = train(name, data, *place, selection)
-    rows = curve_rows(name, curve, selection.choice)
-    print(*rows, sep="\n")
-    write_table(output.curve, rows)
+    table = curve_table(name, curve, selection.choice)
+    print(table.to_string())
+    write_table(output.curve, table)
     plot_curve(output.image, name, curve, selection.choice)
     save_model(output.model, model, compact=name == GENERIC)
 
