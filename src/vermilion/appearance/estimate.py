@@ -24,6 +24,8 @@ from vermilion.storage.errors import InputError
 #: Assumed mean linear albedo of skin: images do not determine the scale of light against albedo.
 SKIN_ALBEDO = 0.35
 _ROUNDS = 4
+#: Least squares of the light: as many where nothing is known of it, half where it is known roughly.
+_LIGHT_ROUNDS = 8
 #: A colour that is wrong by this much counts half (display values, 0 to 255).
 _ROBUST = 12.0
 
@@ -127,12 +129,13 @@ def estimate_appearance(
     finest, trust = seen.colours[:, 0], seen.trust
     basis = seen.basis
     skin = median_colour(finest, trust)
-    light = _fit_light(basis, finest, trust, np.broadcast_to(skin, finest.shape[1:]))
+    problem = _LightProblem.of(basis, finest, trust)
+    light = problem.solve(np.broadcast_to(skin, finest.shape[1:]), rounds=_LIGHT_ROUNDS)
     for _ in range(_ROUNDS):
         shading = lit(basis, light)
         skin = median_colour(finest / shading, trust)
         albedo = fit_albedo(finest, shading, trust, skin, albedo_prior)
-        light = _fit_light(basis, finest, trust, 0.5 * (albedo + skin))
+        light = problem.solve(0.5 * (albedo + skin), rounds=_LIGHT_ROUNDS // 2, start=light)
     # Images do not distinguish a bright light on dark skin from a dim light on fair skin, nor their
     # colours: the mean light on the face is set to white, the skin's mean albedo to SKIN_ALBEDO.
     weight = trust / max(trust.sum(), 1e-12)
@@ -161,32 +164,66 @@ def median_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
     return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
 
 
-def _fit_light(basis, colours, trust, albedo, rounds: int = 8):
-    """Light (9, 3) by iteratively reweighted least squares."""
-    seen = trust > 0
-    # A function or a channel a row: arrays are long, and loops over their short side cost most.
-    rows, weights = np.ascontiguousarray(basis[seen].T), trust[seen]
-    values = np.ascontiguousarray(colours[seen].T)
-    albedos = np.ascontiguousarray(np.broadcast_to(albedo, colours.shape)[seen].T)
-    slope = display_slope(values)
-    light = np.zeros((9, 3))
-    ridge = 1e-4 * np.eye(9)
-    robust = np.ones_like(values)
-    for _ in range(rounds):
-        for c in range(3):
-            w = weights * robust[c] * slope[c] ** 2
-            matrix = (rows * (w * albedos[c] ** 2)) @ rows.T
-            if not np.trace(matrix) > 0:
-                raise InputError(
-                    "no skin that its images show: the face is too small, too dark or hidden",
-                    "a face whose eyes are some 60 pixels apart, in some frames",
-                    "Leave the take out, or give frames that show the face larger.",
-                )
-            right = rows @ (w * albedos[c] * values[c])
-            light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
-        error = slope * (values - albedos * (light.T @ rows))
-        robust = 1.0 / (1.0 + (error / _ROBUST) ** 2)
-    return light
+@dataclass(frozen=True)
+class _LightProblem:
+    """Least squares of the light, under any albedo, from the n samples that M frames show.
+
+    A function or a channel a row: arrays are long, and loops over their short side cost most.
+
+    Attributes:
+        seen: (M, N) bool of the samples.
+        basis: (9, n) harmonics.
+        colours, slope: (3, n) linear RGB, and by how much its display value changes with it.
+        trust: (n,).
+    """
+
+    seen: np.ndarray
+    basis: np.ndarray
+    colours: np.ndarray
+    slope: np.ndarray
+    trust: np.ndarray
+
+    @classmethod
+    def of(cls, basis: np.ndarray, colours: np.ndarray, trust: np.ndarray) -> _LightProblem:
+        """Of harmonics (M, N, 9), colours (M, N, 3) linear RGB, and trust (M, N)."""
+        seen = trust > 0
+        values = np.ascontiguousarray(colours[seen].T)
+        rows = np.ascontiguousarray(basis[seen].T)
+        return cls(seen, rows, values, display_slope(values), trust[seen])
+
+    def solve(self, albedo: np.ndarray, rounds: int, start: np.ndarray | None = None) -> np.ndarray:
+        """Light (9, 3) under an albedo (N, 3), linear RGB, by iteratively reweighted least squares.
+
+        Args:
+            albedo: of the samples.
+            rounds: of least squares.
+            start: (9, 3) light that the first round's weights come from; None: all count alike.
+        """
+        shown = np.broadcast_to(albedo, (*self.seen.shape, 3))[self.seen]
+        albedos = np.ascontiguousarray(shown.T)
+        light = np.zeros((9, 3)) if start is None else start
+        robust = np.ones_like(albedos) if start is None else self._robust(albedos, light)
+        ridge = 1e-4 * np.eye(9)
+        for _ in range(rounds):
+            light = np.zeros((9, 3))
+            for c in range(3):
+                w = self.trust * robust[c] * self.slope[c] ** 2
+                matrix = (self.basis * (w * albedos[c] ** 2)) @ self.basis.T
+                if not np.trace(matrix) > 0:
+                    raise InputError(
+                        "no skin that its images show: the face is too small, too dark or hidden",
+                        "a face whose eyes are some 60 pixels apart, in some frames",
+                        "Leave the take out, or give frames that show the face larger.",
+                    )
+                right = self.basis @ (w * albedos[c] * self.colours[c])
+                light[:, c] = np.linalg.solve(matrix + ridge * np.trace(matrix) / 9, right)
+            robust = self._robust(albedos, light)
+        return light
+
+    def _robust(self, albedos: np.ndarray, light: np.ndarray) -> np.ndarray:
+        """Weights (3, n) of the samples, by how well a light (9, 3) explains them."""
+        error = self.slope * (self.colours - albedos * (light.T @ self.basis))
+        return 1.0 / (1.0 + (error / _ROBUST) ** 2)
 
 
 def light_equations(
