@@ -88,13 +88,16 @@ def label_paths(capture: Source, camera: str) -> dict[int, Path]:
     return {int(path.stem): path for path in sorted(folder.glob("*.json")) if path.stem.isdigit()}
 
 
-def distance_to(points_px: np.ndarray, size: int) -> np.ndarray:
-    """Distance (size, size) px of each pixel centre of a region to dense `points_px` (n, 2)."""
+def distance_to(points_px: np.ndarray, size: int, reach_px: float) -> np.ndarray:
+    """Distance (size, size) px of each pixel centre of a region to dense `points_px` (n, 2).
+
+    It is infinite from `reach_px` on, as distances that far are most of the pixels and of the time.
+    """
     from scipy.spatial import cKDTree  # the workflow asks for `label_paths` at each start
 
     x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
     grid = np.stack([x.ravel(), y.ravel()], axis=1)
-    distance, _ = cKDTree(points_px).query(grid)
+    distance, _ = cKDTree(points_px).query(grid, distance_upper_bound=reach_px)
     return distance.reshape(size, size)
 
 

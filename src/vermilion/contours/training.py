@@ -55,6 +55,11 @@ class ContourTrainingSettings:
     smoothing_px: float = 1.0
     boosting: BoostingSettings = field(default_factory=BoostingSettings)
 
+    @property
+    def reach_px(self) -> float:
+        """How far from a contour its own samples lie; farther pixels are drawn as any other."""
+        return 8.0 * self.label_px
+
     @classmethod
     def of(cls, section) -> ContourTrainingSettings:
         """From a section of the configuration with the same names."""
@@ -116,7 +121,7 @@ def _examples(
         inverse = cv2.invertAffineTransform(region.image_from_region)
         lines = {name: getattr(frame.label, name).dense() for name in CONTOURS}
         distance = {
-            name: distance_to(apply_affine(inverse, line), region.size_px)
+            name: distance_to(apply_affine(inverse, line), region.size_px, settings.reach_px)
             for name, line in lines.items()
         }
         image = region.crop(frame.linear_rgb)
@@ -148,8 +153,11 @@ def _add_contact(
             continue
         towards = end - 0.1 * (end - start)  # the corner itself is outer contour
         line = dark_valley(lightness, start, towards, reach)
-        near = distance_to(Polyline(np.stack([start, end]), False).dense(), len(distance)) < reach
-        contact = distance_to(line, len(distance)) if len(line) else np.full_like(distance, np.inf)
+        straight = Polyline(np.stack([start, end]), False).dense()
+        near = np.isfinite(distance_to(straight, len(distance), reach))
+        contact = np.full_like(distance, np.inf)
+        if len(line):
+            contact = distance_to(line, len(distance), settings.reach_px)
         certain = np.minimum(distance, contact) < 1.5 * settings.label_px
         usable &= certain | ~near
         np.minimum(distance, contact, out=distance)
@@ -196,7 +204,7 @@ def _first_samples(
     """Every pixel near the contour, half of those a little farther, a few of the rest."""
     distance = example.distance[name]
     near = distance < 2.0 * settings.label_px
-    beside = distance < 8.0 * settings.label_px
+    beside = distance < settings.reach_px
     draw = random.random(distance.shape)
     chosen = near | (beside & (draw < 0.4)) | (draw < settings.far_share)
     return chosen & example.usable[name]
