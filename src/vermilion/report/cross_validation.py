@@ -7,16 +7,14 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt
-
+from vermilion.imaging.plot import new_figure, save
 from vermilion.regression.cross_validation import Curve, Rule
-from vermilion.storage.files import atomic_path
 
 
 def plot_curve(path: str | Path, name: str, curve: Curve, choice: Rule = "simplest") -> None:
     """Held-out error over alpha, one line a beta, the choice marked; PNG."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), dpi=110, layout="constrained")
+    figure = new_figure(6.4, 4.0)
+    axes = figure.add_subplot()
     mean, deviation = curve.mean, curve.standard_error
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(curve.betas)))
     for beta, error, spread, colour in zip(curve.betas, mean, deviation, colours, strict=True):
@@ -33,6 +31,4 @@ def plot_curve(path: str | Path, name: str, curve: Curve, choice: Rule = "simple
     )
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
-    plt.close(figure)
+    save(figure, path)
