@@ -1,11 +1,14 @@
 """What surrounds the jobs of a run: one run at a time, what killed runs left behind, checksums."""
 
+import contextlib
 import socket
 import time
 
 from snakemake.exceptions import LockException
 from snakemake.output_index import OutputIndex
+from snakemake.script import PythonScript
 
+from vermilion.app.job_server import served
 from vermilion.app.quick_lookup import remember_producers
 from vermilion.provenance import checksums
 from vermilion.provenance.cleaning import forget_remade
@@ -51,7 +54,8 @@ def _execute(execute, before, executor_plugin, *arguments, **options):
         for folder in cut_folders(Path(R)):
             remove_result(folder)
     try:
-        execute(executor_plugin, *arguments, **options)
+        with served(PythonScript, jobs_of_this_process) if local else contextlib.nullcontext():
+            execute(executor_plugin, *arguments, **options)
     except LockException:
         if before.holder is None:
             raise
@@ -65,6 +69,11 @@ def _execute(execute, before, executor_plugin, *arguments, **options):
             remove_unfinished(R, age_s)
     if before.was_killed and not JOBS_STARTED:
         record_checksums()  # what the killed run made and could not record
+
+
+def jobs_of_this_process():
+    """How many jobs are to be done."""
+    return len(list(workflow.dag.needrun_jobs()))
 
 
 def mend_clock():

@@ -1,0 +1,233 @@
+"""A process that has the libraries of all jobs loaded, and forks itself for each job of a run.
+
+A run is made of a hundred jobs and more, many of them short; Python and the libraries that each of them imports
+took a core second a job. The server imports them once; a fork has them at once, and is otherwise the process that
+Snakemake would have started: the same script, environment, streams and exit status. Modules of this
+project are never loaded before the fork, so that each job sees them as they are.
+
+A request is a connection of its own, given over the server's control socket. It has one line of JSON (script, folder,
+environment); the answer is a line with the job's process number, and one with its exit status.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import os
+import runpy
+import select
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+#: What many jobs import. What is not installed is left out.
+_LIBRARIES = (
+    "snakemake.script", "numpy", "scipy.linalg", "scipy.ndimage", "scipy.optimize", "scipy.sparse.linalg",
+    "scipy.spatial.transform", "cv2", "numba", "pycolmap", "OpenImageIO", "h5py", "pandas", "PIL.Image",
+    "matplotlib.figure", "matplotlib.backends.backend_agg",
+)  # fmt: skip
+#: With fewer jobs, the libraries are not loaded often enough.
+_LEAST_JOBS = 6
+#: The libraries are loaded for one thread: a job that uses more starts its own Python.
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS", "GOTO_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)  # fmt: skip
+_TEMPORARY_VARIABLES = ("TMPDIR", "TMP", "TEMPDIR", "TEMP")
+
+
+class JobServer:
+    """The server, as the process that runs the workflow sees it."""
+
+    def __init__(self) -> None:
+        """Start it; it takes jobs once it has loaded the libraries."""
+        self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._lock, self._loaded = threading.Lock(), False
+        words = [sys.executable, "-m", __name__, str(theirs.fileno())]
+        environment = {**os.environ, **dict.fromkeys(_THREAD_VARIABLES, "1")}
+        self._process = subprocess.Popen(words, pass_fds=[theirs.fileno()], env=environment)
+        theirs.close()
+
+    @property
+    def ready(self) -> bool:
+        """Whether it takes jobs."""
+        with self._lock:
+            if not self._loaded and select.select([self._control], [], [], 0)[0]:
+                self._loaded = bool(self._control.recv(16))
+        return self._loaded and self._process.poll() is None
+
+    def close(self) -> None:
+        """Let it end; jobs that still run end, too."""
+        loaded = self.ready
+        self._control.close()
+        if not loaded:
+            self._process.terminate()
+        self._process.wait()
+
+    def run(self, script: str, environment: dict[str, str], bench_record: Any = None) -> None:
+        """Run a script and wait for its end.
+
+        Args:
+            script: its path.
+            environment: all variables of the job.
+            bench_record: of Snakemake, filled while the job runs.
+
+        Raises:
+            subprocess.CalledProcessError: it ended with another status than 0, or the server ended.
+        """
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            request = {"script": script, "folder": os.getcwd(), "environment": environment}
+            with self._lock:
+                socket.send_fds(self._control, [b"job"], [theirs.fileno()])
+            theirs.close()
+            with ours.makefile("rw", encoding="utf-8") as stream:
+                print(json.dumps(request), file=stream, flush=True)
+                status = _followed(stream, bench_record)
+        if status:
+            raise subprocess.CalledProcessError(status, f"{sys.executable} {script}")
+
+
+def _followed(stream: Any, bench_record: Any) -> int:
+    """The exit status of a job; 1 where the server ended before it."""
+    number = stream.readline()
+    if not number:
+        return 1
+    with _benchmarked(int(number), bench_record):
+        status = stream.readline()
+    return int(status) if status else 1
+
+
+def _benchmarked(number: int, bench_record: Any) -> contextlib.AbstractContextManager[Any]:
+    if bench_record is None:
+        return contextlib.nullcontext()
+    from snakemake.benchmark import benchmarked
+
+    return benchmarked(number, bench_record)
+
+
+@contextmanager
+def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
+    """Let a server run the scripts of a run, from the moment that it is ready.
+
+    Jobs that want more than a Python of this environment (several threads, a container, a shell of their own)
+    are started as ever, and so are all where Snakemake's `PythonScript` is not what this knows.
+
+    Args:
+        python_script: Snakemake's class of a Python script that a job runs.
+        n_jobs: how many jobs the run has; asked when the first one starts.
+    """
+    execute = getattr(python_script, "execute_script", None)
+    if execute is None or not hasattr(os, "pidfd_open"):
+        yield
+        return
+    servers: list[JobServer] = []
+    first = threading.Lock()
+
+    def execute_script(self: Any, fname: str, edit: bool = False) -> None:
+        with first:
+            if not servers and n_jobs() >= _LEAST_JOBS:
+                servers.append(JobServer())
+        if servers and _is_plain(self) and servers[0].ready:
+            servers[0].run(fname, _environment(self.resources), self.bench_record)
+        else:
+            execute(self, fname, edit)
+
+    python_script.execute_script = execute_script
+    try:
+        yield
+    finally:
+        python_script.execute_script = execute
+        for server in servers:
+            server.close()
+
+
+def _is_plain(script: Any) -> bool:
+    """Whether a job wants nothing but this environment's Python and one thread."""
+    wishes = ("container_img", "conda_env", "env_modules", "shadow_dir")
+    own_shell = script.resources.get("shell_exec")
+    return script.threads == 1 and own_shell is None and not any(getattr(script, w) for w in wishes)
+
+
+def _environment(resources: Any) -> dict[str, str]:
+    """The variables that Snakemake gives to a job of one thread."""
+    temporary = resources.get("tmpdir")
+    changed = dict.fromkeys(_THREAD_VARIABLES, "1")
+    if temporary:
+        changed |= dict.fromkeys(_TEMPORARY_VARIABLES, str(temporary))
+    return {**os.environ, **changed}
+
+
+def _serve(control: socket.socket) -> str | None:
+    """Fork for each request until nobody can make one. Returns in a fork: the script that it is to run."""
+    selector = selectors.DefaultSelector()
+    selector.register(control, selectors.EVENT_READ)
+    waiting: dict[int, tuple[int, socket.socket]] = {}  # handle -> process, connection
+    while True:
+        for key, _ in selector.select():
+            if key.fileobj is control:
+                data, handles, _, _ = socket.recv_fds(control, 16, 1)
+                if not data:
+                    return None
+                connection = socket.socket(fileno=handles[0])
+                number = os.fork()
+                if number == 0:
+                    selector.close()
+                    control.close()
+                    return _begun(connection)
+                connection.sendall(f"{number}\n".encode())
+                handle = os.pidfd_open(number)
+                waiting[handle] = (number, connection)
+                selector.register(handle, selectors.EVENT_READ)
+                continue
+            number, connection = waiting.pop(key.fd)
+            selector.unregister(key.fd)
+            os.close(key.fd)
+            status = os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
+            with contextlib.suppress(OSError), connection:  # nobody may wait any more
+                connection.sendall(f"{status}\n".encode())
+
+
+def _begun(connection: socket.socket) -> str:
+    """Become the process of a job: its folder, environment and signals. Returns its script."""
+    with connection, connection.makefile(encoding="utf-8") as stream:
+        request = json.loads(stream.readline())
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    script = request["script"]
+    sys.argv = [script]
+    sys.path[0] = str(Path(script).parent)
+    return script
+
+
+def _load() -> None:
+    """Import the libraries that are installed."""
+    for name in _LIBRARIES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+
+
+def main() -> None:
+    """Be the server; in a fork, run the job's script as Python would."""
+    # The terminal tells all processes: jobs end by themselves, and the server when its run has ended.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    control = socket.socket(fileno=int(sys.argv[1]))
+    _load()
+    control.send(b"ready")
+    script = _serve(control)
+    if script is not None:
+        runpy.run_path(script, run_name="__main__")
+
+
+if __name__ == "__main__":
+    main()

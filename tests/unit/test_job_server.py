@@ -1,0 +1,153 @@
+"""A fork of the job server is the process that Snakemake would have started."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from vermilion.app.job_server import JobServer, served
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux and Python 3.9")
+
+TELL = """
+    import atexit, json, os, sys
+    def tell():
+        loaded = sorted(name for name in sys.modules if name.startswith("vermilion."))
+        with open(sys.argv[0] + ".json", "w") as file:
+            json.dump({"argv": sys.argv, "name": __name__, "folder": os.getcwd(), "path": sys.path[0],
+                       "environment": dict(os.environ), "loaded": loaded}, file)
+    atexit.register(tell)
+"""
+
+
+def script_of(folder, text, name="job.py"):
+    path = folder / name
+    path.write_text(textwrap.dedent(text))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def server():
+    made = JobServer()
+    end = time.monotonic() + 60
+    while not made.ready and time.monotonic() < end:
+        time.sleep(0.02)
+    yield made
+    made.close()
+
+
+def test_job_sees_what_it_sees_in_a_python_of_its_own(server, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    environment = {"PATH": os.environ["PATH"], "OF_THE_JOB": "1"}
+    seen = []
+    for number, run in enumerate((
+        lambda script: server.run(script, environment),
+        lambda script: subprocess.run([sys.executable, script], env=environment, check=True),
+    )):  # fmt: skip
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        script = script_of(folder, TELL)
+        run(script)
+        found = json.loads((folder / "job.py.json").read_text().replace(str(folder), "<folder>"))
+        found["environment"].pop("LC_CTYPE", None)  # Python itself adds it where there is no locale
+        assert all(name.startswith("vermilion.app") for name in found.pop("loaded"))
+        seen.append(found)
+    assert seen[0] == seen[1]
+    assert seen[0]["folder"] == str(tmp_path)
+    assert seen[0]["environment"] == environment
+
+
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [("raise SystemExit(3)", 3), ("1 / 0", 1), ("import os, signal; os.kill(os.getpid(), 9)", -9)],
+)
+def test_status_of_a_failed_job_is_told(server, tmp_path, text, status):
+    script = script_of(tmp_path, text)
+    with pytest.raises(subprocess.CalledProcessError, match=r"job\.py") as told:
+        server.run(script, dict(os.environ))
+    assert told.value.returncode == status
+
+
+def test_jobs_run_beside_each_other(server, tmp_path):
+    wait = f"""
+        import pathlib, sys, time
+        pathlib.Path(sys.argv[0] + ".here").touch()
+        while len(list(pathlib.Path({str(tmp_path)!r}).glob("*.here"))) < 2: time.sleep(0.01)
+    """
+    threads = [
+        threading.Thread(target=server.run, args=(script_of(tmp_path, wait, name), {}))
+        for name in ("a.py", "b.py")
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=20)
+    assert not any(thread.is_alive() for thread in threads)
+
+
+def test_job_ends_with_a_run_that_is_killed(tmp_path):
+    job = script_of(
+        tmp_path,
+        """
+        import os, pathlib, sys, time
+        from vermilion.storage.lifetime import end_with_run
+        end_with_run()
+        pathlib.Path(sys.argv[0] + ".pid").write_text(str(os.getpid()) + "\\n")
+        time.sleep(120)
+        """,
+    )
+    run = script_of(
+        tmp_path,
+        f"""
+        import os, time
+        from vermilion.app.job_server import JobServer
+        from vermilion.storage.lifetime import RUN
+        server = JobServer()
+        while not server.ready: time.sleep(0.02)
+        server.run({job!r}, dict(os.environ) | {{RUN: str(os.getpid())}})
+        """,
+        "run.py",
+    )
+    process = subprocess.Popen([sys.executable, run])
+    told = tmp_path / "job.py.pid"
+    until(lambda: told.exists() and told.read_text().endswith("\n"))
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    until(lambda: not os.path.exists(f"/proc/{told.read_text().strip()}"))
+
+
+def until(holds, within_s=60):
+    end = time.monotonic() + within_s
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("wishes", "n_jobs"),
+    [({"threads": 2}, 100), ({"container_img": "an.image"}, 100), ({}, 2)],
+)
+def test_what_a_fork_cannot_be_is_started_as_ever(wishes, n_jobs):
+    started = []
+
+    class Script:
+        container_img = conda_env = env_modules = shadow_dir = bench_record = None
+        threads, resources = 1, SimpleNamespace(get=lambda name: None)
+
+        def execute_script(self, fname, edit=False):
+            started.append(fname)
+
+    original = Script.execute_script
+    with served(Script, lambda: n_jobs):
+        script = Script()
+        vars(script).update(wishes)
+        script.execute_script("job.py")
+    assert started == ["job.py"]
+    assert Script.execute_script is original
