@@ -1,10 +1,11 @@
 """What the workflow costs beside the work: jobs of Snakemake against the same library calls in a loop.
 
 The images of one synthetic take are rendered chunk by chunk, once by the workflow with one core (planning,
-processes, imports, records), once by a loop in one process. With the folder of a finished run, prints also what
+processes, imports, records), once more without its job server, once by a loop in one process. With the folder of a finished run, prints also what
 share the cost of a job is of each rule's work at chunks of 100 frames.
 
     python -m benchmarks overhead --frames 100 --chunks 2
+    python -m benchmarks overhead --frames 5 --chunks 24
     python -m benchmarks overhead --results results/sample
 """
 
@@ -17,12 +18,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 import yaml
 
 from benchmarks.common import print_table
+from vermilion.app.job_server import SWITCH
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = {
@@ -46,13 +49,16 @@ def run(arguments: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
         folder = Path(name)
         make_project(folder, arguments.frames, arguments.chunks)
-        spent(folder, "--until", "studio_rig_p_video")  # what both ways need
+        spent(folder, "--until", "studio_rig_p_video")  # what all ways need
         idle_wall_s, idle_s = spent(folder, "--until", "studio_rig_p_video")
+        alone = shutil.copytree(folder, folder / "alone", symlinks=True)
         workflow_wall_s, workflow_s = spent(folder)
+        alone_wall_s, alone_s = spent(alone, server="off")
         loop_wall_s, loop_s = spent_in_a_loop(folder, arguments.frames, arguments.chunks)
     job_s = (workflow_s - idle_s - loop_s) / arguments.chunks
     rows = [
         {"way": "workflow", "wall_s": workflow_wall_s, "core_s": workflow_s},
+        {"way": "workflow without job server", "wall_s": alone_wall_s, "core_s": alone_s},
         {"way": "loop", "wall_s": loop_wall_s, "core_s": loop_s},
         {"way": "workflow with nothing to do", "wall_s": idle_wall_s, "core_s": idle_s},
     ]
@@ -83,11 +89,11 @@ def make_project(folder: Path, frames: int, chunks: int) -> None:
     (folder / ".venv-mediapipe").symlink_to(ROOT / ".venv-mediapipe")
 
 
-def spent(folder: Path, *options: str, cores: int = 1) -> tuple[float, float]:
+def spent(folder: Path, *options: str, cores: int = 1, server: str = "on") -> tuple[float, float]:
     """(Seconds, core seconds) of a run of the target `captures` with so many cores."""
     words = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile")]
     words += ["--configfile", "config.yaml", "--cores", str(cores), "captures", *options]
-    return spent_by(words, folder)
+    return spent_by(words, folder, {SWITCH: server})
 
 
 def spent_in_a_loop(folder: Path, frames: int, chunks: int) -> tuple[float, float]:
@@ -100,9 +106,11 @@ def spent_in_a_loop(folder: Path, frames: int, chunks: int) -> tuple[float, floa
     return spent_by(words, folder)
 
 
-def spent_by(words: list[str], folder: Path) -> tuple[float, float]:
-    """(Seconds, core seconds) of a command with all that it starts."""
-    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}"}
+def spent_by(
+    words: list[str], folder: Path, variables: Mapping[str, str] | None = None
+) -> tuple[float, float]:
+    """(Seconds, core seconds) of a command with all that it starts, under some more variables."""
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}", **(variables or {})}
     start = time.perf_counter()
     with (folder / "printed.txt").open("w") as stream:
         process = subprocess.Popen(

@@ -28,6 +28,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+#: Environment variable; `off`: each job starts its own Python.
+SWITCH = "VERMILION_JOB_SERVER"
 #: What many jobs import. What is not installed is left out.
 _LIBRARIES = (
     "snakemake.script", "numpy", "scipy.linalg", "scipy.ndimage", "scipy.optimize", "scipy.sparse.linalg",
@@ -126,7 +128,7 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
         n_jobs: how many jobs the run has; asked when the first one starts.
     """
     execute = getattr(python_script, "execute_script", None)
-    if execute is None or not hasattr(os, "pidfd_open"):
+    if execute is None or not hasattr(os, "pidfd_open") or os.environ.get(SWITCH) == "off":
         yield
         return
     servers: list[JobServer] = []
