@@ -20,6 +20,7 @@ import numpy as np
 from vermilion.export.animation import Animation, NamedShapes
 from vermilion.geometry.mesh_files import MESH_SUFFIXES, read_polygons
 from vermilion.storage.errors import InputError
+from vermilion.storage.kernels import kernel
 
 SPARSE, SMOOTH = 2e-3, 2e-2  # mm^2 for a weight of 1
 _SWEEPS, _SETTLED = 400, 1e-5
@@ -161,31 +162,38 @@ def bounded_weights(
         sparse, smooth: mm^2 for a weight of 1.
         start: (F, K) weights to begin with; None: zero.
     """
+    weights = np.zeros(target.shape) if start is None else start.copy()
+    gram, target = np.ascontiguousarray(gram), np.ascontiguousarray(target)
+    _descend(gram, target, weights, 0.5 * sparse, smooth, _SWEEPS, _SETTLED)
+    return weights
+
+
+@kernel()
+def _descend(gram, target, weights, offset, smooth, sweeps, settled):
+    """Coordinate descent, in place: a shape at a time, in frames of even row, then of odd row."""
     count, n_shapes = target.shape
-    weights = np.zeros((count, n_shapes)) if start is None else start.copy()
-    parities = [np.arange(start, count, 2) for start in (0, 1)]
-    neighbours = np.full(count, 2.0)
-    neighbours[[0, -1]] -= 1.0
-    if count == 1:
-        neighbours[:] = 0.0
-    for _ in range(_SWEEPS):
+    for _ in range(sweeps):
         largest = 0.0
         for k in range(n_shapes):
-            for rows in parities:
-                if not len(rows):
-                    continue
-                beside = np.zeros(len(rows))
-                beside[rows > 0] += weights[rows[rows > 0] - 1, k]
-                beside[rows < count - 1] += weights[rows[rows < count - 1] + 1, k]
-                others = weights[rows] @ gram[k] - weights[rows, k] * gram[k, k]
-                high = target[rows, k] - others - 0.5 * sparse + smooth * beside
-                step = gram[k, k] + smooth * neighbours[rows]
-                new = np.clip(high / np.maximum(step, 1e-12), 0.0, 1.0)
-                largest = max(largest, float(np.abs(new - weights[rows, k]).max()))
-                weights[rows, k] = new
-        if largest < _SETTLED:
+            for parity in range(2):
+                for row in range(parity, count, 2):
+                    beside, neighbours = 0.0, 0
+                    if row > 0:
+                        beside += weights[row - 1, k]
+                        neighbours += 1
+                    if row < count - 1:
+                        beside += weights[row + 1, k]
+                        neighbours += 1
+                    others = -weights[row, k] * gram[k, k]
+                    for other in range(n_shapes):
+                        others += weights[row, other] * gram[k, other]
+                    high = target[row, k] - others - offset + smooth * beside
+                    step = max(gram[k, k] + smooth * neighbours, 1e-12)
+                    new = min(max(high / step, 0.0), 1.0)
+                    largest = max(largest, abs(new - weights[row, k]))
+                    weights[row, k] = new
+        if largest < settled:
             break
-    return weights
 
 
 def _one_shape(rest: np.ndarray, trust: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
