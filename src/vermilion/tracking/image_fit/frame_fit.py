@@ -136,23 +136,38 @@ class FrameProblem:
         """The frame's solution, coarse to fine from the landmark fit."""
         x, counts = view.start, self.settings.iterations
         for level, count in zip(reversed(range(len(counts))), counts, strict=True):
-            # Coarse images need fewer samples.
-            part = self._exposed(self._visible(view, 2**level), x, view, level)
-            cost, errors = self._cost(x, view, level, part)
-            for _ in range(count):
-                matrix, right = self._normal_equations(x, view, level, part, errors)
-                program = FrameMatrix(matrix)
-                target = solve_in_box(program, right[None], self.lower, self.upper, x[None])[0]
-                for scale in (1.0, 0.5, 0.25):
-                    trial = x + scale * (target - x)
-                    trial_cost, trial_errors = self._cost(trial, view, level, part)
-                    if trial_cost < cost:
-                        break
-                else:
-                    break
-                x, cost, errors = trial, trial_cost, trial_errors
+            x, part, errors = self._descended(x, view, level, count)
         matrix, right = self._normal_equations(x, view, 0, part, errors)
         return FrameFit(x, matrix, right, part.gain)
+
+    def settled(self, view: FrameView, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """A solution (6 + K,) of nearly this energy, at the finest resolution, and the frame's gain.
+
+        Half of the steps: who calls it again, with the next appearance, need not converge each time.
+        """
+        x, part, _ = self._descended(x, view, 0, (self.settings.iterations[-1] + 1) // 2)
+        return x, part.gain
+
+    def _descended(
+        self, x: np.ndarray, view: FrameView, level: int, count: int
+    ) -> tuple[np.ndarray, _VisibleSamples, tuple]:
+        """At most `count` Gauss-Newton steps from x (6 + K,) at one resolution."""
+        # Coarse images need fewer samples.
+        part = self._exposed(self._visible(view, 2**level), x, view, level)
+        cost, errors = self._cost(x, view, level, part)
+        for _ in range(count):
+            matrix, right = self._normal_equations(x, view, level, part, errors)
+            program = FrameMatrix(matrix)
+            target = solve_in_box(program, right[None], self.lower, self.upper, x[None])[0]
+            for scale in (1.0, 0.5, 0.25):
+                trial = x + scale * (target - x)
+                trial_cost, trial_errors = self._cost(trial, view, level, part)
+                if trial_cost < cost:
+                    break
+            else:
+                break
+            x, cost, errors = trial, trial_cost, trial_errors
+        return x, part, errors
 
     def _exposed(self, part: _VisibleSamples, x, view: FrameView, level: int) -> _VisibleSamples:
         """The samples with the gain that explains the frame's brightness at x (6 + K,)."""

@@ -247,13 +247,17 @@ def learn_appearance(
         problem_of: the energy of a frame under an appearance.
     """
     xs, gains = [view.start for view in views], np.ones(len(views))
-    for _ in range(rounds):
+    for number in range(rounds):
         appearance = estimate_appearance(
             frames, samples, observe_samples(views, xs, gains, face), albedo_prior
         )
         problem = problem_of(appearance)
-        fits = [problem.solve(view) for view in views]
-        xs, gains = [fit.x for fit in fits], np.array([fit.gain for fit in fits])
+        if number == 0:
+            fits = [problem.solve(view) for view in views]
+            found = [(fit.x, fit.gain) for fit in fits]
+        else:
+            found = [problem.settled(view, x) for view, x in zip(views, xs, strict=True)]
+        xs, gains = [x for x, _ in found], np.array([gain for _, gain in found])
         gains = gains / np.exp(np.log(gains).mean())  # nobody knows the light's own brightness
     seen = observe_samples(views, xs, gains, face)
     return estimate_appearance(frames, samples, seen, albedo_prior)
