@@ -185,7 +185,7 @@ class _LightProblem:
 
     @classmethod
     def of(cls, basis: np.ndarray, colours: np.ndarray, trust: np.ndarray) -> _LightProblem:
-        """Of harmonics (M, N, 9), colours (M, N, 3) linear RGB, and trust (M, N)."""
+        """From `basis` (M, N, 9), `colours` (M, N, 3) linear RGB and `trust` (M, N)."""
         seen = trust > 0
         values = np.ascontiguousarray(colours[seen].T)
         rows = np.ascontiguousarray(basis[seen].T)

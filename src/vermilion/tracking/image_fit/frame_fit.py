@@ -141,7 +141,7 @@ class FrameProblem:
         return FrameFit(x, matrix, right, part.gain)
 
     def settled(self, view: FrameView, x: np.ndarray) -> tuple[np.ndarray, float]:
-        """A solution (6 + K,) of nearly this energy, at the finest resolution, and the frame's gain.
+        """A better x (6 + K,) at the finest resolution, beginning at `x` (6 + K,), and the frame's gain.
 
         Half of the steps: who calls it again, with the next appearance, need not converge each time.
         """
