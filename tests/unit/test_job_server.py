@@ -12,9 +12,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from vermilion.app import job_server
 from vermilion.app.job_server import JobServer, served
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux and Python 3.9")
+pytestmark = pytest.mark.skipif(not job_server._can_watch(), reason="no handles of processes here")
 
 TELL = """
     import atexit, json, os, sys
@@ -135,6 +136,20 @@ def until(holds, within_s=60):
     [({"threads": 2}, 100), ({"container_img": "an.image"}, 100), ({}, 2)],
 )
 def test_what_a_fork_cannot_be_is_started_as_ever(wishes, n_jobs):
+    started = scripts_started(wishes, n_jobs)
+    assert started == ["job.py"]
+
+
+def test_kernel_without_handles_of_processes_starts_jobs_as_ever(monkeypatch):
+    def refused(number):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "pidfd_open", refused)
+    assert scripts_started({}, 100) == ["job.py"]
+
+
+def scripts_started(wishes, n_jobs):
+    """Scripts that Snakemake's own way started."""
     started = []
 
     class Script:
@@ -149,5 +164,5 @@ def test_what_a_fork_cannot_be_is_started_as_ever(wishes, n_jobs):
         script = Script()
         vars(script).update(wishes)
         script.execute_script("job.py")
-    assert started == ["job.py"]
     assert Script.execute_script is original
+    return started

@@ -128,7 +128,7 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
         n_jobs: how many jobs the run has; asked when the first one starts.
     """
     execute = getattr(python_script, "execute_script", None)
-    if execute is None or not hasattr(os, "pidfd_open") or os.environ.get(SWITCH) == "off":
+    if execute is None or not _can_watch() or os.environ.get(SWITCH) == "off":
         yield
         return
     servers: list[JobServer] = []
@@ -150,6 +150,15 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
         python_script.execute_script = execute
         for server in servers:
             server.close()
+
+
+def _can_watch() -> bool:
+    """Whether a process can wait for another one's end: on Linux, where neither kernel nor container forbids it."""
+    try:
+        os.close(os.pidfd_open(os.getpid()))
+    except (AttributeError, OSError):
+        return False
+    return True
 
 
 def _is_plain(script: Any) -> bool:
