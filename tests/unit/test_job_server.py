@@ -65,6 +65,19 @@ def test_job_sees_what_it_sees_in_a_python_of_its_own(server, tmp_path, monkeypa
     assert seen[0]["environment"] == environment
 
 
+def test_libraries_start_no_threads_that_a_fork_would_lose(server, tmp_path):
+    count = """
+        import os, sys
+        with open(sys.argv[0] + ".txt", "w") as file:
+            print(len(os.listdir("/proc/self/task")), "numba" in sys.modules, file=file)
+        with open(f"/proc/{os.getppid()}/status") as file:
+            threads = next(line for line in file if line.startswith("Threads:"))
+        assert threads.split()[1] == "1", threads
+    """
+    server.run(script_of(tmp_path, count), dict(os.environ))
+    assert (tmp_path / "job.py.txt").read_text() == "1 True\n"
+
+
 @pytest.mark.parametrize(
     ("text", "status"),
     [("raise SystemExit(3)", 3), ("1 / 0", 1), ("import os, signal; os.kill(os.getpid(), 9)", -9)],
@@ -110,7 +123,7 @@ def test_job_ends_with_a_run_that_is_killed(tmp_path):
         import os, time
         from vermilion.app.job_server import JobServer
         from vermilion.storage.lifetime import RUN
-        server = JobServer()
+        server = JobServer(libraries=[])
         while not server.ready: time.sleep(0.02)
         server.run({job!r}, dict(os.environ) | {{RUN: str(os.getpid())}})
         """,

@@ -23,7 +23,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from typing import Any
 #: Environment variable; `off`: each job starts its own Python.
 SWITCH = "VERMILION_JOB_SERVER"
 #: What many jobs import. What is not installed is left out.
-_LIBRARIES = (
+LIBRARIES = (
     "snakemake.script", "numpy", "scipy.linalg", "scipy.ndimage", "scipy.optimize", "scipy.sparse.linalg",
     "scipy.spatial.transform", "cv2", "numba", "pycolmap", "OpenImageIO", "h5py", "pandas", "PIL.Image",
     "matplotlib.figure", "matplotlib.backends.backend_agg",
@@ -49,11 +49,11 @@ _TEMPORARY_VARIABLES = ("TMPDIR", "TMP", "TEMPDIR", "TEMP")
 class JobServer:
     """The server, as the process that runs the workflow sees it."""
 
-    def __init__(self) -> None:
-        """Start it; it takes jobs once it has loaded the libraries."""
+    def __init__(self, libraries: Sequence[str] = LIBRARIES) -> None:
+        """Start it; it takes jobs once it has loaded the `libraries`."""
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._lock, self._loaded = threading.Lock(), False
-        words = [sys.executable, "-m", __name__, str(theirs.fileno())]
+        words = [sys.executable, "-m", __name__, str(theirs.fileno()), *libraries]
         environment = {**os.environ, **dict.fromkeys(_THREAD_VARIABLES, "1")}
         self._process = subprocess.Popen(words, pass_fds=[theirs.fileno()], env=environment)
         theirs.close()
@@ -221,9 +221,9 @@ def _begun(connection: socket.socket) -> str:
     return script
 
 
-def _load() -> None:
-    """Import the libraries that are installed."""
-    for name in _LIBRARIES:
+def _load(libraries: Sequence[str]) -> None:
+    """Import those that are installed."""
+    for name in libraries:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
 
@@ -233,7 +233,7 @@ def main() -> None:
     # The terminal tells all processes: jobs end by themselves, and the server when its run has ended.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     control = socket.socket(fileno=int(sys.argv[1]))
-    _load()
+    _load(sys.argv[2:])
     control.send(b"ready")
     script = _serve(control)
     if script is not None:
