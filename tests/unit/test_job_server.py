@@ -15,7 +15,7 @@ import pytest
 from vermilion.app import job_server
 from vermilion.app.job_server import JobServer, served
 
-pytestmark = pytest.mark.skipif(not job_server._can_watch(), reason="no handles of processes here")
+pytestmark = pytest.mark.skipif(not job_server.can_watch(), reason="no handles of processes here")
 
 TELL = """
     import atexit, json, os, sys

@@ -128,7 +128,7 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
         n_jobs: how many jobs the run has; asked when the first one starts.
     """
     execute = getattr(python_script, "execute_script", None)
-    if execute is None or not _can_watch() or os.environ.get(SWITCH) == "off":
+    if execute is None or not can_watch() or os.environ.get(SWITCH) == "off":
         yield
         return
     servers: list[JobServer] = []
@@ -152,7 +152,7 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
             server.close()
 
 
-def _can_watch() -> bool:
+def can_watch() -> bool:
     """Whether a process can wait for another one's end: on Linux, where neither kernel nor container forbids it."""
     try:
         os.close(os.pidfd_open(os.getpid()))
