@@ -56,9 +56,12 @@ class ForeignTracker:
         kept, triangles = submesh(face.triangles, ~face.regions["teeth"])
         meshes = pymeshlab.MeshSet(verbose=False)
         meshes.add_mesh(pymeshlab.Mesh(pose[kept].astype(float), triangles.astype(np.int32)))
+        # All parameters: what is left out has the value of the last call in this process.
         meshes.meshing_decimation_quadric_edge_collapse(
-            targetfacenum=n_triangles, preservetopology=True, preserveboundary=True, qualitythr=0.3
-        )
+            targetfacenum=n_triangles, targetperc=0.0, qualitythr=0.3, preserveboundary=True,
+            boundaryweight=1.0, preservenormal=False, preservetopology=True, optimalplacement=True,
+            planarquadric=False, planarweight=0.001, qualityweight=False, autoclean=True, selected=False,
+        )  # fmt: skip
         mesh = meshes.current_mesh()
         points = Surface(pose, face.triangles).closest(np.array(mesh.vertex_matrix()))
         # Another order of vertices than any that the decimation has of the original's.

@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pymeshlab
 import pytest
 
 from benchmarks.foreign_tracker import ForeignTracker
@@ -38,6 +39,19 @@ def foreign(opening=SLIGHTLY_OPEN):
     mesh = Mesh(tracker.sample(face) @ TURN.T + AWAY_MM, tracker.triangles)
     found = label_topology(small_tracker(), mesh, landmarks, least_opening=-SLIGHTLY_OPEN)
     return tracker, found.model, tracker.sample(face), face
+
+
+def test_simulated_topology_does_not_depend_on_an_earlier_decimation():
+    studio = small_studio()
+    before = ForeignTracker.of(studio, 3000)
+    other = pymeshlab.MeshSet(verbose=False)
+    other.create_sphere(subdiv=3)
+    # Its parameters become the defaults of the next call in this process.
+    other.meshing_decimation_quadric_edge_collapse(
+        targetfacenum=300, planarquadric=True, qualityweight=True, optimalplacement=False
+    )
+    after = ForeignTracker.of(studio, 3000)
+    assert np.array_equal(before.triangles, after.triangles)
 
 
 @pytest.mark.parametrize("opening", [0.0, SLIGHTLY_OPEN])

@@ -93,8 +93,10 @@ def _decimated(
             v_scalar_array=np.asarray(density, dtype=np.float64),
         )
     )
+    # All parameters: what is left out has the value of the last call in this process.
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=int(n_triangles),
+        targetperc=0.0,
         qualitythr=0.4,
         preserveboundary=True,
         boundaryweight=1.0,
@@ -104,6 +106,8 @@ def _decimated(
         planarquadric=True,
         planarweight=0.01,
         qualityweight=True,
+        autoclean=True,
+        selected=False,
     )
     mesh = meshes.current_mesh()
     return np.array(mesh.vertex_matrix()), np.array(mesh.face_matrix(), dtype=np.int32)
