@@ -28,6 +28,8 @@ from benchmarks.common import print_table
 from vermilion.app.job_server import SWITCH
 
 ROOT = Path(__file__).resolve().parents[1]
+#: Keys of a studio take that are its camera's.
+OWN_CAMERA = {"camera_distance_mm", "video_view_mm"}
 IMAGES = {
     "video_size_px": [320, 240],
     "occlusion_directions": 32,
@@ -143,7 +145,7 @@ def loop(frames: int, chunks: int) -> None:
         take_settings({
             "role": "video", "first": 0, "last": frames * chunks - 1, "fps": 30,
             "actor": {"seed": subject.seed, "identity": subject.identity},
-            "performance": subject.takes["video"].model_dump(mode="json"),
+            "performance": subject.takes["video"].model_dump(mode="json", exclude=OWN_CAMERA),
             **{key: getattr(studio, key) for key in keys},
         }),
     )  # fmt: skip

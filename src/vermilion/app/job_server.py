@@ -226,6 +226,8 @@ def _load(libraries: Sequence[str]) -> None:
     for name in libraries:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    if "numba" in sys.modules:  # its compiler is set up by the first function that it compiles
+        sys.modules["numba"].njit("int64(int64)")(lambda number: number)
 
 
 def main() -> None:
