@@ -1,8 +1,8 @@
 """What the workflow costs beside the work: jobs of Snakemake against the same library calls in a loop.
 
 The images of one synthetic take are rendered chunk by chunk, once by the workflow with one core (planning,
-processes, imports, records), once more without its job server, once by a loop in one process. With the folder of a finished run, prints also what
-share the cost of a job is of each rule's work at chunks of 100 frames.
+processes, imports, records), once more without its job server, once by a loop in one process. With the folder of
+a finished run, prints also what share the cost of a job is of each rule's work at chunks of 100 frames.
 
     python -m benchmarks overhead --frames 100 --chunks 2
     python -m benchmarks overhead --frames 5 --chunks 24

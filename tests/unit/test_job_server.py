@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -87,6 +88,34 @@ def test_status_of_a_failed_job_is_told(server, tmp_path, text, status):
     with pytest.raises(subprocess.CalledProcessError, match=r"job\.py") as told:
         server.run(script, dict(os.environ))
     assert told.value.returncode == status
+
+
+def test_job_that_cannot_start_is_told():
+    gone = JobServer(libraries=[])
+    until(lambda: gone.ready)
+    gone._process.kill()
+    gone._process.wait()
+    assert not gone.ready
+    assert not gone.run("job.py", {})
+    gone.close()
+
+
+def test_fork_that_fails_is_told(monkeypatch):
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+    def refused():
+        raise BlockingIOError
+
+    monkeypatch.setattr(os, "fork", refused)
+    thread = threading.Thread(target=job_server._serve, args=(theirs,))
+    thread.start()
+    asked, answered = socket.socketpair()
+    socket.send_fds(ours, [b"job"], [answered.fileno()])
+    answered.close()
+    assert asked.recv(10) == b""
+    ours.close()
+    thread.join(timeout=10)
+    assert not thread.is_alive()
 
 
 def test_jobs_run_beside_each_other(server, tmp_path):

@@ -74,7 +74,7 @@ class JobServer:
             self._process.terminate()
         self._process.wait()
 
-    def run(self, script: str, environment: dict[str, str], bench_record: Any = None) -> None:
+    def run(self, script: str, environment: dict[str, str], bench_record: Any = None) -> bool:
         """Run a script and wait for its end.
 
         Args:
@@ -82,30 +82,30 @@ class JobServer:
             environment: all variables of the job.
             bench_record: of Snakemake, filled while the job runs.
 
+        Returns:
+            whether it could be started.
+
         Raises:
             subprocess.CalledProcessError: it ended with another status than 0, or the server ended.
         """
+        content = {"script": script, "folder": os.getcwd(), "environment": environment}
+        request = f"{json.dumps(content)}\n".encode()
         ours, theirs = socket.socketpair()
-        with ours, theirs:
-            request = {"script": script, "folder": os.getcwd(), "environment": environment}
-            with self._lock:
-                socket.send_fds(self._control, [b"job"], [theirs.fileno()])
-            theirs.close()
-            with ours.makefile("rw", encoding="utf-8") as stream:
-                print(json.dumps(request), file=stream, flush=True)
-                status = _followed(stream, bench_record)
+        with ours, ours.makefile(encoding="utf-8") as stream:
+            try:
+                with theirs, self._lock:
+                    socket.send_fds(self._control, [b"job"], [theirs.fileno()])
+                ours.sendall(request)
+                number = stream.readline()
+            except OSError:  # the server has ended
+                return False
+            if not number:
+                return False
+            with _benchmarked(int(number), bench_record):
+                status = int(stream.readline() or 1)
         if status:
             raise subprocess.CalledProcessError(status, f"{sys.executable} {script}")
-
-
-def _followed(stream: Any, bench_record: Any) -> int:
-    """The exit status of a job; 1 where the server ended before it."""
-    number = stream.readline()
-    if not number:
-        return 1
-    with _benchmarked(int(number), bench_record):
-        status = stream.readline()
-    return int(status) if status else 1
+        return True
 
 
 def _benchmarked(number: int, bench_record: Any) -> contextlib.AbstractContextManager[Any]:
@@ -138,9 +138,8 @@ def served(python_script: Any, n_jobs: Callable[[], int]) -> Iterator[None]:
         with first:
             if not servers and n_jobs() >= _LEAST_JOBS:
                 servers.append(JobServer())
-        if servers and _is_plain(self) and servers[0].ready:
-            servers[0].run(fname, _environment(self.resources), self.bench_record)
-        else:
+        taken = servers and _is_plain(self) and servers[0].ready
+        if not taken or not servers[0].run(fname, _environment(self.resources), self.bench_record):
             execute(self, fname, edit)
 
     python_script.execute_script = execute_script
@@ -181,30 +180,42 @@ def _serve(control: socket.socket) -> str | None:
     """Fork for each request until nobody can make one. Returns in a fork: the script that it is to run."""
     selector = selectors.DefaultSelector()
     selector.register(control, selectors.EVENT_READ)
-    waiting: dict[int, tuple[int, socket.socket]] = {}  # handle -> process, connection
+    running: dict[int, tuple[int, socket.socket]] = {}  # handle -> process, connection
     while True:
         for key, _ in selector.select():
-            if key.fileobj is control:
-                data, handles, _, _ = socket.recv_fds(control, 16, 1)
-                if not data:
-                    return None
-                connection = socket.socket(fileno=handles[0])
-                number = os.fork()
-                if number == 0:
-                    selector.close()
-                    control.close()
-                    return _begun(connection)
-                connection.sendall(f"{number}\n".encode())
-                handle = os.pidfd_open(number)
-                waiting[handle] = (number, connection)
-                selector.register(handle, selectors.EVENT_READ)
+            if key.fileobj is not control:
+                selector.unregister(key.fd)
+                _tell_end(key.fd, *running.pop(key.fd))
                 continue
-            number, connection = waiting.pop(key.fd)
-            selector.unregister(key.fd)
-            os.close(key.fd)
-            status = os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
-            with contextlib.suppress(OSError), connection:  # nobody may wait any more
-                connection.sendall(f"{status}\n".encode())
+            data, handles, _, _ = socket.recv_fds(control, 16, 1)
+            if not data:
+                return None
+            connection = socket.socket(fileno=handles[0])
+            try:
+                number = os.fork()
+            except OSError:  # no memory, or too many processes: the job starts as ever
+                connection.close()
+                continue
+            if number == 0:
+                selector.close()
+                control.close()
+                for handle, (_, other) in running.items():
+                    os.close(handle)
+                    other.close()
+                return _begun(connection)
+            with contextlib.suppress(OSError):  # nobody may wait any more
+                connection.sendall(f"{number}\n".encode())
+            handle = os.pidfd_open(number)
+            running[handle] = (number, connection)
+            selector.register(handle, selectors.EVENT_READ)
+
+
+def _tell_end(handle: int, number: int, connection: socket.socket) -> None:
+    """Tell the exit status of a process that has ended."""
+    os.close(handle)
+    status = os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
+    with contextlib.suppress(OSError), connection:  # nobody may wait any more
+        connection.sendall(f"{status}\n".encode())
 
 
 def _begun(connection: socket.socket) -> str:
@@ -217,7 +228,8 @@ def _begun(connection: socket.socket) -> str:
     os.environ.update(request["environment"])
     script = request["script"]
     sys.argv = [script]
-    sys.path[0] = str(Path(script).parent)
+    if not sys.flags.safe_path:
+        sys.path[0] = str(Path(script).parent)
     return script
 
 
