@@ -297,7 +297,7 @@ rule makeup_join:
         P.benchmark("makeup_join", "take")
     localrule: True
     resources:
-        mem_mb=growing(600),
+        mem_mb=growing(800),
         runtime=growing(20),
     params:
         code=code_of("apply/makeup_join"),

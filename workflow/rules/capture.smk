@@ -71,7 +71,7 @@ rule video_facts:
     benchmark:
         P.benchmark("video_facts", "take")
     resources:
-        mem_mb=growing(600),
+        mem_mb=growing(800),
         runtime=growing(30),
     params:
         code=code_of("capture/video_facts"),

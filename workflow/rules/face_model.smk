@@ -11,7 +11,7 @@ rule face_archive:
         P.benchmark("face_archive", "run")
     localrule: True
     resources:
-        mem_mb=growing(600),
+        mem_mb=growing(800),
         runtime=growing(60),
     params:
         cfg=cfg_of("face_model.url", "face_model.sha256"),

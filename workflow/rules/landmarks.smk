@@ -181,7 +181,7 @@ rule landmarks_followed:
     benchmark:
         P.benchmark("landmarks_followed", "take")
     resources:
-        mem_mb=growing(600, for_each_frame=0.05),
+        mem_mb=growing(800, for_each_frame=0.05),
         runtime=growing(10),
     params:
         cfg=cfg_of("landmarks.following"),

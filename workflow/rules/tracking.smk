@@ -333,7 +333,7 @@ rule ablations:
         P.benchmark("ablations", "run")
     localrule: True
     resources:
-        mem_mb=growing(600),
+        mem_mb=growing(800),
         runtime=growing(10),
     params:
         code=code_of("tracking/ablations"),
@@ -383,7 +383,7 @@ rule tracking_topology:
         P.benchmark("tracking_topology", "take")
     localrule: True
     resources:
-        mem_mb=growing(600),
+        mem_mb=growing(800),
         runtime=growing(10),
     params:
         code=code_of("tracking/tracking_topology"),
