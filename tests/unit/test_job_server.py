@@ -9,7 +9,6 @@ import sys
 import textwrap
 import threading
 import time
-from types import SimpleNamespace
 
 import pytest
 
@@ -38,9 +37,7 @@ def script_of(folder, text, name="job.py"):
 @pytest.fixture(scope="module")
 def server():
     made = JobServer()
-    end = time.monotonic() + 60
-    while not made.ready and time.monotonic() < end:
-        time.sleep(0.02)
+    until(lambda: made.ready)
     yield made
     made.close()
 
@@ -174,37 +171,62 @@ def until(holds, within_s=60):
 
 
 @pytest.mark.parametrize(
-    ("wishes", "n_jobs"),
-    [({"threads": 2}, 100), ({"container_img": "an.image"}, 100), ({}, 2)],
+    ("wishes", "n_jobs", "forked"),
+    [
+        ({}, 100, True),
+        ({"threads": 2}, 100, False),
+        ({"container_img": "an.image"}, 100, False),
+        ({"resources": {"shell_exec": "zsh"}}, 100, False),
+        ({}, 2, False),
+    ],
 )
-def test_what_a_fork_cannot_be_is_started_as_ever(wishes, n_jobs):
-    started = scripts_started(wishes, n_jobs)
-    assert started == ["job.py"]
+def test_what_a_fork_cannot_be_is_started_as_ever(monkeypatch, wishes, n_jobs, forked):
+    expected = (["job.py"], []) if forked else ([], ["job.py"])
+    assert scripts_of_a_run(monkeypatch, wishes, n_jobs) == expected
 
 
-def test_kernel_without_handles_of_processes_starts_jobs_as_ever(monkeypatch):
+def test_job_that_the_server_cannot_start_is_started_as_ever(monkeypatch):
+    assert scripts_of_a_run(monkeypatch, {}, 100, can_fork=False) == (["job.py"], ["job.py"])
+
+
+def test_switch_and_a_kernel_without_handles_of_processes_start_jobs_as_ever(monkeypatch):
+    with monkeypatch.context() as changed:
+        changed.setenv(job_server.SWITCH, "off")
+        assert scripts_of_a_run(changed, {}, 100) == ([], ["job.py"])
+
     def refused(number):
         raise PermissionError
 
     monkeypatch.setattr(os, "pidfd_open", refused)
-    assert scripts_started({}, 100) == ["job.py"]
+    assert scripts_of_a_run(monkeypatch, {}, 100) == ([], ["job.py"])
 
 
-def scripts_started(wishes, n_jobs):
-    """Scripts that Snakemake's own way started."""
-    started = []
+def scripts_of_a_run(monkeypatch, wishes, n_jobs, can_fork=True):
+    """Scripts that a server, which is ready at once, was asked for, and those that Snakemake's own way started."""
+    asked, started = [], []
+
+    class Server:
+        ready = True
+
+        def run(self, script, environment, bench_record):
+            asked.append(script)
+            return can_fork
+
+        def close(self):
+            pass
 
     class Script:
         container_img = conda_env = env_modules = shadow_dir = bench_record = None
-        threads, resources = 1, SimpleNamespace(get=lambda name: None)
+
+        def __init__(self):
+            vars(self).update({"threads": 1, "resources": {}, **wishes})
 
         def execute_script(self, fname, edit=False):
             started.append(fname)
 
+    monkeypatch.setattr(job_server, "JobServer", Server)
     original = Script.execute_script
     with served(Script, lambda: n_jobs):
-        script = Script()
-        vars(script).update(wishes)
-        script.execute_script("job.py")
+        Script().execute_script("job.py")
     assert Script.execute_script is original
-    return started
+    return asked, started
