@@ -11,6 +11,7 @@ import threading
 import time
 
 import pytest
+from snakemake.benchmark import BenchmarkRecord
 
 from vermilion.app import job_server
 from vermilion.app.job_server import JobServer, served
@@ -85,6 +86,26 @@ def test_status_of_a_failed_job_is_told(server, tmp_path, text, status):
     with pytest.raises(subprocess.CalledProcessError, match=r"job\.py") as told:
         server.run(script, dict(os.environ))
     assert told.value.returncode == status
+
+
+def test_record_of_a_job_has_its_peak_of_memory_and_its_time(server, tmp_path):
+    work = """
+        import time
+        held = b"1" * 400_000_000
+        del held
+        while time.process_time() < 0.5: pass
+    """
+    record = BenchmarkRecord()
+    server.run(script_of(tmp_path, work), dict(os.environ), record)
+    told = dict(
+        zip(record.get_header(), record.to_tsv(extended_fmt=False).split("\t"), strict=True)
+    )
+    assert 400 < float(told["max_rss"]) < 1500
+    assert 0.5 <= float(told["cpu_time"]) < 5
+    assert float(told["cpu_time"]) <= float(told["s"]) + 0.1
+    assert float(told["mean_load"]) == pytest.approx(
+        100 * float(told["cpu_time"]) / float(told["s"]), rel=0.05
+    )
 
 
 def test_job_that_cannot_start_is_told():
