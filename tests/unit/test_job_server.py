@@ -88,6 +88,50 @@ def test_status_of_a_failed_job_is_told(server, tmp_path, text, status):
     assert told.value.returncode == status
 
 
+def test_job_that_has_succeeded_does_all_that_is_done_at_an_end_and_takes_nothing_apart(
+    server, tmp_path
+):
+    ends = """
+        import atexit, pathlib, sys, threading, time
+        here = sys.argv[0]
+        class Held:
+            def __del__(self): pathlib.Path(here + ".taken_apart").touch()
+        held = sys.modules["numpy"].held = Held()
+        def tell(name): pathlib.Path(here + name).touch()
+        atexit.register(tell, ".atexit")
+        threading.Thread(target=lambda: (time.sleep(0.3), tell(".thread"))).start()
+        handle = open(here + ".txt", "w")
+        sys.stdout = handle
+        print("said last", end="")
+    """
+    server.run(script_of(tmp_path, ends), dict(os.environ))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "job.py", "job.py.atexit", "job.py.thread", "job.py.txt",
+    }  # fmt: skip
+    assert (tmp_path / "job.py.txt").read_text() == "said last"
+
+
+def test_job_that_fails_says_nothing_but_its_own_error(tmp_path):
+    server = script_of(
+        tmp_path,
+        """
+        import os, subprocess, sys, time
+        from vermilion.app.job_server import JobServer
+        server = JobServer()
+        while not server.ready: time.sleep(0.01)
+        try:
+            server.run(sys.argv[1], dict(os.environ))
+        except subprocess.CalledProcessError:
+            print("failed")
+        server.close()
+        """,
+        "server.py",
+    )
+    job = script_of(tmp_path, "raise SystemExit('said why')")
+    run = subprocess.run([sys.executable, server, job], capture_output=True, text=True, timeout=60)
+    assert (run.stdout, run.stderr) == ("failed\n", "said why\n")
+
+
 def test_record_of_a_job_has_its_peak_of_memory_and_its_time(server, tmp_path):
     work = """
         import time

@@ -11,7 +11,9 @@ environment); the answer is a line with the job's process number, and one with i
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import importlib
 import json
 import os
@@ -255,10 +257,34 @@ def _load(libraries: Sequence[str]) -> None:
             importlib.import_module(name)
     if "numba" in sys.modules:  # its compiler is set up by the first function that it compiles
         sys.modules["numba"].njit("int64(int64)")(lambda number: number)
+    gc.freeze()  # a fork's collector would copy the pages of all that it looks at
+
+
+class _LastStep:
+    """What a process does after all else that is done at its end.
+
+    A Python that ends takes each of its objects apart. In a fork this copies every page that it shares with the
+    server, 0.7 core seconds a job; a job that has succeeded leaves that to the kernel.
+    """
+
+    def __init__(self) -> None:
+        self.succeeded = False
+        atexit.register(self)  # functions registered later, as by libraries and jobs, run before
+
+    def __call__(self) -> None:
+        if self.succeeded:
+            with contextlib.suppress(
+                OSError, ValueError
+            ):  # else Python says so, and gives the status
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(0)
+        gc.unfreeze()  # libraries look for what is left
 
 
 def main() -> None:
     """Be the server; in a fork, run the job's script as Python would."""
+    last_step = _LastStep()
     # The terminal tells all processes: jobs end by themselves, and the server when its run has ended.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     control = socket.socket(fileno=int(sys.argv[1]))
@@ -267,6 +293,7 @@ def main() -> None:
     script = _serve(control)
     if script is not None:
         runpy.run_path(script, run_name="__main__")
+    last_step.succeeded = True
 
 
 if __name__ == "__main__":
