@@ -41,7 +41,8 @@ class SurfaceQuality:
     Attributes:
         folded: (F,) number of lip triangles that are flipped or folded.
         hidden_share: (F,) share of the vermilion that faces the camera and has inner mouth before it.
-        roughness_mm: (F,) of the inner edge; base_roughness_mm: (F,) of the base track's.
+        roughness_mm: (F,) of the inner edge.
+        base_roughness_mm: (F,) of the base track's.
     """
 
     folded: np.ndarray
