@@ -51,3 +51,20 @@ def test_every_page_of_the_site_is_in_its_navigation():
     navigation = set(re.findall(r"[\w/]+\.md", text.split("\nnav:\n")[1]))
     pages = {str(path.relative_to(PROJECT / "docs")) for path in (PROJECT / "docs").rglob("*.md")}
     assert pages | {"changelog.md", "contributing.md"} == navigation
+
+
+def test_the_site_asks_no_network():
+    # What the theme would fetch by itself: fonts, the worker of the offline search, mermaid's drawing.
+    settings = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert re.search(r"^  font: false$", settings, re.M)
+    assert re.findall(r"https?://\S+", settings) == []
+    script = re.findall(r"^    - (\S*iframe-worker\S*)$", settings, re.M)
+    assert script, "without it the plugin `offline` names an address"
+    sheets = re.findall(r"^  - (stylesheets/\S+)$", settings, re.M)
+    for name in (*script, *sheets):
+        assert (PROJECT / "docs" / name).is_file(), name
+    notice = PROJECT / "docs/javascripts/LICENSE.iframe-worker.txt"
+    assert "Martin Donath" in notice.read_text(encoding="utf-8")
+    for page in (*(PROJECT / "docs").rglob("*.md"), PROJECT / "CHANGELOG.md"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r"!\[[^\]]*\]\(https?:|<img|<script|```mermaid", text), page.name

@@ -24,7 +24,7 @@ class CalibrationConfig(StageConfig):
     """Calibration from images of a board, for captures without `cameras/`."""
 
     board: Literal["charuco", "checkerboard"] = Field(
-        "charuco", description="Kind of the calibration board."
+        "charuco", description="Kind of the calibration board: `charuco` or `checkerboard`."
     )
     squares: tuple[int, int] = Field(
         (9, 7), description="Squares of the board in a row and in a column (count)."

@@ -127,12 +127,14 @@ class EvaluationConfig(StageConfig):
     variants: list[Literal["rbf", "affine", "kernel", "shape-only", "distances-only", "paper"]] = (
         Field(
             [],
-            description="Variants of the regressors to train and evaluate beside them: another estimator, "
-            "the configured one on some of the features, or the paper's network with layers alone.",
+            description="Variants of the regressors to train and evaluate beside them: another estimator "
+            "(`rbf`, `affine`, `kernel`), the configured one on some of the features (`shape-only`, "
+            "`distances-only`), or the paper's network with layers alone (`paper`).",
         )
     )
     variants_of: list[Literal["PS", "MS", "GR"]] = Field(
-        ["PS", "MS", "GR"], description="Regressors that the variants are made of."
+        ["PS", "MS", "GR"],
+        description="Regressors that the variants are made of: `PS`, `MS`, `GR`.",
     )
     generic: str | None = Field(
         None,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel
 
@@ -35,7 +35,7 @@ def take_sheet_schema() -> dict[str, Any]:
     properties = {
         "subject": {**name, "description": "Name of the person."},
         "take": {**name, "description": "Name of the take; unique for the subject."},
-        "role": {"enum": list(ROLES), "description": "What the take is for."},
+        "role": {"enum": list(ROLES), "description": "`plain`, `tattoo`, `video` or `tracked`."},
         "source": {
             "type": "string",
             "description": "Capture folder, frame folder or video; `studio` for a synthetic one.",
@@ -107,6 +107,11 @@ def _section(model: type[BaseModel], prefix: str) -> list[str]:
         shown = json.dumps(_plain(default)) if not field.is_required() else "(needed)"
         limits = ", ".join(_limit(m) for m in field.metadata if _limit(m))
         rows.append(f"| `{key}` | `{shown}` | {limits} | {description} |")
+        for named in get_args(inner):
+            if isinstance(named, type) and issubclass(named, BaseModel):
+                of_each = f"{key}.<name>"
+                nested += [f"## `{of_each}`", "", f"Of each in `{key}`.", ""]
+                nested += _section(named, f"{of_each}.")
     table = ["| key | default | range | meaning |", "|---|---|---|---|", *rows, ""] if rows else []
     return table + nested
 

@@ -262,7 +262,7 @@ class ScanConfig(StageConfig):
         min_length=1,
         description="OBJ, PLY or STL of a head or face, of any topology, unit and frame.",
     )
-    eyes: Literal["open", "closed"] = Field("open", description="State of the scan's eyelids.")
+    eyes: Literal["open", "closed"] = Field("open", description="Eyelids: `open` or `closed`.")
     landmarks: str | None = Field(
         None,
         description="Landmarks placed by hand: a TSV with columns landmark (0 to 65), x, y, z in the "

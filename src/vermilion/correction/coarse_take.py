@@ -32,7 +32,8 @@ class CoarseTake:
         triangles: (T, 3) of the mesh.
         neutral_mm: (V, 3) the subject's coarse neutral, head frame (`identity.npz`). It sets the weights
             of the integration, and a regressor recognises a subject of its training by it.
-        rotation, translation_mm: (F, 3, 3) and (F, 3), `world_from_head` of the tracker.
+        rotation: (F, 3, 3), `world_from_head` of the tracker.
+        translation_mm: (F, 3), likewise.
         features: (F, M) of the regressor; NaN where a frame has none.
         valid: (F,) bool, frames that were tracked.
         image: contours in the images of the same frames; None where there are none.

@@ -30,7 +30,8 @@ class LinearConstraints:
     """m constraints on a frame's mesh: a weighted sum of vertices has a value along a direction.
 
     Attributes:
-        vertices: (m, k) vertex ids; coefficients: (m, k).
+        vertices: (m, k) vertex ids.
+        coefficients: (m, k).
         directions: (m, 3) unit vectors, in the mesh's frame.
         target_mm: (m,) along the direction.
         compliance: (m,); 0 is exact.

@@ -122,7 +122,8 @@ class Corrector:
         """Corrected meshes (F, V, 3) float64, head frame, mm, without the image.
 
         Args:
-            coarse_mm: (F, V, 3) head frame; features: (F, M); all finite.
+            coarse_mm: (F, V, 3) head frame, finite.
+            features: (F, M), finite.
             frames: (F,) frame numbers, ascending.
         """
         mixture = self.model.mixture(features, self.neutral_mm)

@@ -26,8 +26,10 @@ class ImageContours:
     Attributes:
         face: the model that the mesh is of, for its contours and landmarks.
         camera: of the images.
-        outer_px, inner_px: (F, n, 2) rings of points, sample k found from sample k of the mesh.
-        outer_found, inner_found: (F, n) bool.
+        outer_px: (F, n, 2) ring of points, sample k found from sample k of the mesh.
+        inner_px: (F, n, 2), likewise.
+        outer_found: (F, n) bool.
+        inner_found: (F, n) bool.
     """
 
     face: FaceModel

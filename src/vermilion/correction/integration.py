@@ -44,7 +44,8 @@ class LayerIntegrator:
     """Integrates correction layers over one topology and neutral; factors on construction.
 
     Args:
-        neutral_mm: (V, 3) of the person, head frame; triangles: (T, 3).
+        neutral_mm: (V, 3) of the person, head frame.
+        triangles: (T, 3).
         mask: (M,) triangle ids of the layer.
         seam_mm: width of the soft ring outside the mask.
         detail_mm: detail finer than this comes from layers, the rest from displacements; 0: layers alone.
@@ -52,7 +53,8 @@ class LayerIntegrator:
     Attributes:
         mask: (M,) triangle ids of the layer.
         free: (N,) ids of the vertices that may move.
-        matrix: (N, N) of the system; `factor`: its Cholesky factor.
+        matrix: (N, N) of the system.
+        factor: its Cholesky factor.
         weights: (M, 3) of the edges 12, 20, 01 of each mask triangle.
         places: (N',) which of the mask's corners, ascending, have a place: those that may move.
         place_weight: (N',) a / l^2 of each; none without `detail_mm`.

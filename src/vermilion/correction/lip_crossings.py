@@ -24,7 +24,8 @@ class Crossings:
 
     Attributes:
         inside: (n,) the vertex that lies inside.
-        triangle: (n, 3) corners of the triangle that the edge enters; barycentric: (n, 3) there.
+        triangle: (n, 3) corners of the triangle that the edge enters.
+        barycentric: (n, 3) there.
         normal: (n, 3) of that triangle, outwards.
         depth_mm: (n,) of the vertex below the triangle's plane.
     """

@@ -40,7 +40,8 @@ def repose_motion(
     Robust Gauss-Newton from no motion, all frames together.
 
     Args:
-        anchors_mm: (F, a, 3) world; anchors_px: (F, a, 2) where they belong.
+        anchors_mm: (F, a, 3) world.
+        anchors_px: (F, a, 2) where they belong.
         samples_mm: (F, m, 3) contour samples, world.
         lines: of `ImageContours.lines`, (F, m, ...).
         pivot_mm: (F, 3).

@@ -52,7 +52,10 @@ def accumulate(corners, row, weights, points, layers, series, limits, right):
         corners: (M, 3) int32 rows of `points`.
         row: (L,) int32 row of `right` of each of the points.
         weights: (M, 3) of the edges 12, 20, 01.
-        points: (L, 3, LANES); layers: (M, 9, LANES); series: `TURN_SERIES`; limits: `turn_limits`.
+        points: (L, 3, LANES).
+        layers: (M, 9, LANES).
+        series: `TURN_SERIES`.
+        limits: `turn_limits`.
         right: (N, 3, LANES) float64, added to.
     """
     last = series.shape[1]
@@ -107,7 +110,8 @@ def accumulate_mixture(corners, row, weights, points, basis, mixture, series, li
     """`accumulate` for layers `basis @ mixture`, which are made a tile at a time.
 
     Args:
-        basis: (M * 9, R); mixture: (R, LANES); others as in `accumulate`.
+        basis: (M * 9, R).
+        mixture: (R, LANES); others as in `accumulate`.
     """
     made = np.empty((_TILE * 9, LANES), dtype=basis.dtype)
     for first in range(0, corners.shape[0], _TILE):

@@ -1,8 +1,8 @@
 """What is wrong with the surface of corrected lips, frame by frame, without any truth.
 
-folded triangles    two triangles of one lip fold on each other where the base track's do not
-inner mouth         inside of the mouth seen in front of the vermilion by the camera
-edge roughness      how ragged the inner edge of the lips is in the image, beside that of the base track
+- folded triangles: two triangles of one lip fold on each other where the base track's do not
+- inner mouth: inside of the mouth seen in front of the vermilion by the camera
+- edge roughness: how ragged the inner edge of the lips is in the image, beside that of the base track
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ class SurfaceQuality:
     Attributes:
         folded: (F,) number of lip triangles that are flipped or folded.
         hidden_share: (F,) share of the vermilion that faces the camera and has inner mouth before it.
-        roughness_mm: (F,) of the inner edge; base_roughness_mm: (F,) of the base track's.
+        roughness_mm: (F,) of the inner edge.
+        base_roughness_mm: (F,) of the base track's.
     """
 
     folded: np.ndarray

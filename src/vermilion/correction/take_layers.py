@@ -24,7 +24,8 @@ class TakeLayers:
 
     Attributes:
         layers: (F, T, 9) float32 over the correspondence's mask; zero where not valid.
-        coarse_mm, accurate_mm: (F, V, 3) C and H on C's topology, head frame.
+        coarse_mm: (F, V, 3) C, head frame.
+        accurate_mm: (F, V, 3) H on C's topology, head frame.
         valid: (F,) bool.
         alignment_mm: (F,) RMS of the aligned regions against each other.
         strength: (F,) RMS of the layer's entries.

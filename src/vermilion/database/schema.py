@@ -36,7 +36,8 @@ class TakeEntry:
     """The frames of a take.
 
     Attributes:
-        subject, take: names.
+        subject: name of the person.
+        take: name of the take.
         fps: frames a second.
         split: the take sheet's text.
         frames: (F,) int32 frame numbers, ascending.

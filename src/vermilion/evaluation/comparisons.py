@@ -31,7 +31,8 @@ class Question:
 
     Attributes:
         name: what is asked, for a reader.
-        first, second: variants (`""` is the configured regressor), or another row's name after `=`.
+        first: a variant (`""` is the configured regressor), or another row's name after `=`.
+        second: the same of the other.
     """
 
     name: str

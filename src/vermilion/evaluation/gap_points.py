@@ -31,7 +31,8 @@ class GapPoints:
     Attributes:
         points: N on the surface's edges.
         triangles: (U, 3) of the surface.
-        sides: (N,) +1 upper lip, -1 lower; columns: (N,) of `lip_gaps`.
+        sides: (N,) +1 upper lip, -1 lower.
+        columns: (N,) of `lip_gaps`.
     """
 
     points: SurfacePoints
@@ -53,7 +54,8 @@ class GapPoints:
         Args:
             model: V vertices.
             rest_mm: (V, 3) where the model's vertices lie on the surface in the neutral, mm; NaN where unknown.
-            surface_mm: (S, 3) the surface in the neutral, the same world; triangles: (U, 3) of it.
+            surface_mm: (S, 3) the surface in the neutral, the same world.
+            triangles: (U, 3) of it.
         """
         known = np.isfinite(rest_mm).all(axis=1)[model.triangles].all(axis=1)
         own, surface = (

@@ -34,7 +34,8 @@ class StudyPlan:
     Attributes:
         counts: numbers of corrected frames; those that the take does not have are left out.
         choices: suggested, uniform, extremes, random.
-        draws, seed: of random choices.
+        draws: number of random choices.
+        seed: of random choices.
     """
 
     counts: Sequence[int]

@@ -27,7 +27,8 @@ def sums_of_kinds(
 
     Args:
         errors_mm: (F, V) vertex errors.
-        kinds: (F,) of `KINDS`; clips: (F,).
+        kinds: (F,) of `KINDS`.
+        clips: (F,).
     """
     sums = {}
     for kind in KINDS:

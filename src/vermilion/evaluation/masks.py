@@ -86,7 +86,8 @@ def mask_on(
 
     Args:
         vertices_mm, triangles: the mesh, (V, 3) and (T, 3).
-        mask_vertices_mm: (V', 3) of the other mesh; mask_triangles: (M, 3), finite corners only.
+        mask_vertices_mm: (V', 3) of the other mesh.
+        mask_triangles: (M, 3), finite corners only.
         reach_mm: largest distance between a triangle's middle and the mask.
     """
     finite = np.isfinite(mask_vertices_mm[mask_triangles]).all(axis=(1, 2))

@@ -63,7 +63,8 @@ def kinds_of_shapes(
     those that lose more of their red are rolls.
 
     Args:
-        points_mm: (F, V, 3) on the model's topology, head frame; neutral_mm: (V, 3) likewise.
+        points_mm: (F, V, 3) on the model's topology, head frame.
+        neutral_mm: (V, 3) likewise.
         valid: (V,) bool, vertices that are known.
     """
     frames = _lip_measures(np.concatenate([neutral_mm[None], points_mm]), model, valid)

@@ -35,8 +35,8 @@ class Pool:
     """A regressor over all takes that have it.
 
     Attributes:
-        own, base: its sums and the base track's, of the same clips; `base` is empty where the takes
-            have none.
+        own: its sums.
+        base: the base track's, of the same clips; empty where the takes have none.
         frames: measured.
     """
 

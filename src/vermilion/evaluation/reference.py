@@ -210,7 +210,8 @@ def drift(
     and the point that it lay on in the neutral. NaN for vertices that are not asked for.
 
     Args:
-        sequence_mm: (F, V, 3) in the reference's world; triangles: (T, 3) of it.
+        sequence_mm: (F, V, 3) in the reference's world.
+        triangles: (T, 3) of it.
         vertices: (V,) bool.
     """
     ids = np.flatnonzero(vertices)

@@ -153,7 +153,8 @@ def evaluate_reconstruction(
     """Measure **H** itself against known truth, in the rig's world, without alignment.
 
     Args:
-        sequence_mm: (F, V, 3) of H, world; frames: (F,) frame numbers.
+        sequence_mm: (F, V, 3) of H, world.
+        frames: (F,) frame numbers.
         reference: truth, followed from the neutral.
         drift_mm: (F, V) of `drift`.
         seen: (F, V) bool, reference points that enough cameras see; the region `visible` is what

@@ -26,7 +26,8 @@ class Camera:
         name: the camera's name (its folder under `frames/`).
         model: COLMAP model name (`PINHOLE`, `OPENCV`, ...).
         params: the model's parameters, pixels first.
-        width_px, height_px: image size.
+        width_px: width of the image.
+        height_px: height of the image.
         cam_from_world: (3, 4) [R | t].
     """
 

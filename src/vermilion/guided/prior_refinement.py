@@ -213,7 +213,8 @@ class PriorRefiner:
         """Coefficients (k, r) and shifts (k, 3) of the sketched frames, all at once.
 
         Args:
-            matrix: (k, p, p); right: (k, p), of `_information`.
+            matrix: (k, p, p).
+            right: (k, p), of `_information`.
             among: (k, k) kernel of the frames.
             mean: (k, r) prior.
         """

@@ -28,7 +28,8 @@ class SurfaceEdges:
 
     Attributes:
         vertices: (e, 2) ids.
-        start, end: e points each, at the two ends, both bound to the same triangle.
+        start: e points, at one end.
+        end: e points, at the other end, bound to the same triangles.
     """
 
     vertices: np.ndarray
@@ -55,7 +56,8 @@ class ContourSurface:
         around: (k, 3) triangles that touch their vertices, for the normals.
         sides: (V,) int8: +1 upper lip, -1 lower; 0 unknown: only the projected normal tells.
         rim: edges of the candidates where the mesh itself ends.
-        outer_upper, outer_lower: edges of the border of the red; none where unknown.
+        outer_upper: edges of the upper border of the red; none where unknown.
+        outer_lower: edges of the lower border; none where unknown.
     """
 
     triangles: np.ndarray
@@ -103,9 +105,12 @@ class Segments:
     """Segments on a mesh, seen by a camera.
 
     Attributes:
-        start, end: S points each, the ends of a segment bound to the same triangle.
-        start_px, end_px: (S, 2).
-        start_depth, end_depth: (S,) mm along the view.
+        start: S points, at one end.
+        end: S points, at the other end, bound to the same triangles.
+        start_px: (S, 2).
+        end_px: (S, 2).
+        start_depth: (S,) mm along the view.
+        end_depth: (S,) mm along the view.
         normal: (S, 3) of the surface, not of unit length.
     """
 

@@ -24,7 +24,8 @@ class Presentation:
         orientation: of the display matrix.
         pixel_aspect: width of a pixel over its height, 0 where unknown.
         colour: how code values become sRGB.
-        white_nits, peak_nits: of the clip, for HDR.
+        white_nits: white of the clip, for HDR.
+        peak_nits: brightest value of the clip, for HDR.
     """
 
     orientation: Orientation = UPRIGHT

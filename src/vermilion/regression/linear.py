@@ -209,7 +209,8 @@ def layer_basis(
     Phi' Phi + alpha of the centred training and of the ridge's prior.
 
     Args:
-        design: (F, P); weights: (P, K).
+        design: (F, P).
+        weights: (P, K).
         alpha: ridge parameter.
         allowed: root mean square of the change over that of the predictions about their mean.
     """

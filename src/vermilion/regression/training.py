@@ -165,7 +165,9 @@ def _judged(
 
     Args:
         group: kind of the regressor: the generic one is judged by the motion of the mask's corners alone.
-        data: the rows; features: (F, M') of them; places: (F, N * 3) displacements.
+        data: the rows.
+        features: (F, M') of them.
+        places: (F, N * 3) displacements.
         area_mm2: (T,) of the layers' triangles.
     """
     if group != GENERIC:
