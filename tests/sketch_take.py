@@ -128,7 +128,6 @@ def _write_configuration(folder: Path) -> None:
     content = {
         "results": "results/take", "takes": "takes.tsv", "face_model": {"name": "procedural"},
         "studio": {"subjects": {"rig": {"seed": 1, "takes": {"rom": {"seed": 1}}}}},
-        "landmarks": {"training_takes": ["rig/rom"]},
         "tracking": {"image_fit": {"enabled": False}},
         "guided": {"takes": {TAKE: "base"}},
     }  # fmt: skip

@@ -34,7 +34,6 @@ def load(source, confined=("incoming",), **more):
     """Problems of a sheet of one row."""
     Path("takes.tsv").write_text(HEADER + f"s1\tphone\tvideo\t{source}\t0\t0\t25\tnone\n")
     raw = {"takes": "takes.tsv", "capture": {"confined_to": list(confined)}, **more}
-    raw["landmarks"] = {"detector": "mediapipe", **more.get("landmarks", {})}
     try:
         load_configuration(raw, "config.yaml")
     except ConfigurationError as error:

@@ -2,7 +2,6 @@
 
 import difflib
 
-import numpy as np
 import pytest
 import yaml
 
@@ -11,7 +10,6 @@ from vermilion.config.moved import MOVED, REMOVED
 from vermilion.config.reference import generated_files
 from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO
-from vermilion.imaging.images import write_srgb8
 from vermilion.storage.errors import ConfigurationError
 
 from .conftest import ROOT
@@ -77,26 +75,6 @@ def test_takes_that_are_named_must_exist(tmp_path):
     assert "neutral_frames: found 'anna/shot'; expected a take of role video of a subject" in text
     assert "studio.subjects: found ['berta']; expected also 'anna'" in text
     assert "studio.subjects.berta: found a subject without takes" in text
-
-
-def test_images_without_a_detector_are_named_before_any_job(tmp_path):
-    (tmp_path / "shot").mkdir()
-    write_srgb8(tmp_path / "shot" / "000000.png", np.zeros((8, 8, 3), np.uint8))
-    sheet = tmp_path / "takes.tsv"
-    rows = f"anna\tshot\tvideo\t{tmp_path}/shot\t0\t0\t25\tnone\n"
-    sheet.write_text("subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\n" + rows)
-    raw = {"takes": str(sheet), "apply": {"regressor": "none"}}
-    with pytest.raises(ConfigurationError) as error:
-        load_configuration(raw, "mine.yaml")
-    (problem,) = error.value.problems
-    assert problem.startswith("mine.yaml, key landmarks.training_takes: found none; expected takes")
-    assert "anna/shot has images" in problem and problem.endswith("`mediapipe` is for real faces.")
-    for more in (
-        {"landmarks": {"detector": "mediapipe"}},
-        {"landmarks": {"training_takes": ["anna/shot"]}},
-        {"skip_takes": {"anna/shot": "blurred"}},
-    ):
-        load_configuration(raw | more, "mine.yaml")
 
 
 def test_a_neutral_frame_is_one_of_the_take(tmp_path):

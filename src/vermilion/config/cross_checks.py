@@ -35,22 +35,6 @@ def cross_checks(configuration: Configuration, takes: list[Take]) -> Iterator[st
             )
 
 
-def untrained_landmarks(configuration: Configuration, takes: list[Take]) -> Iterator[str]:
-    """A sentence where images need a detector that no take trains.
-
-    The studio's captures, and what is studied of their truth, are made without landmarks.
-    """
-    options, skipped = configuration.landmarks, configuration.skip_takes
-    images = [t.name for t in takes if t.role in IMAGE_ROLES and t.source != STUDIO]
-    needing = [name for name in images if name not in skipped]
-    if options.detector == "trained" and needing and not options.training_takes:
-        yield (
-            "landmarks.training_takes: found none; expected takes with clicked landmarks (subject/take), "
-            f"as landmarks.detector is `trained` and {needing[0]} has images. Name them, or set "
-            "landmarks.detector: `mediapipe` is for real faces."
-        )
-
-
 def _studio(configuration: Configuration, takes: list[Take], subjects: set[str]) -> Iterator[str]:
     studio = configuration.studio.subjects
     for take in takes:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vermilion.config.confined import allowed_folders, key_problems, sheet_problems
-from vermilion.config.cross_checks import cross_checks, untrained_landmarks
+from vermilion.config.cross_checks import cross_checks
 from vermilion.config.external_base import (
     external_problems,
     missing_files,
@@ -36,8 +36,7 @@ def load_configuration(
     Args:
         raw: the configuration as read from YAML and the command line.
         origin: file name(s) for the messages.
-        check_disk: also check that sources and frame ranges exist, and that something finds landmarks in
-            the images (the main process does).
+        check_disk: also check that sources and frame ranges exist (the main process does).
 
     Raises:
         ConfigurationError: listing every problem of both files.
@@ -68,7 +67,6 @@ def load_configuration(
     if check_disk and configuration is not None:
         files = [*missing_files(configuration, takes), *missing_heads(configuration, takes)]
         problems += [f"{origin}, key {problem}" for problem in files]
-        problems += [f"{origin}, key {p}" for p in untrained_landmarks(configuration, takes)]
     if check_disk:
         reading = AS_TAGGED if configuration is None else configuration.capture.reading
         for take in takes:
