@@ -101,6 +101,31 @@ def test_what_is_no_video_stops_before_anything_is_fetched(
     assert not (tmp_path / "out").exists()
 
 
+def test_the_generic_regressor_needs_ict_facekit(clip, tmp_path, monkeypatch):
+    monkeypatch.setenv("VERMILION_ICT_FACEKIT", "procedural")
+    with pytest.raises(VermilionError, match="MODEL=generic needs ICT-FaceKit") as raised:
+        correct_lips(
+            str(clip), model="generic", scan=None, out=str(tmp_path / "out"), span=(None, None),
+            options=[],
+        )  # fmt: skip
+    assert "export VERMILION_ICT_FACEKIT=" in str(raised.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_why_nothing_was_made_is_not_said_twice(clip, tmp_path, monkeypatch, capsys):
+    why = "found no usable face"  # `run_workflow` says it, with the log
+    monkeypatch.setenv("VERMILION_ICT_FACEKIT", "procedural")
+    monkeypatch.setenv("VERMILION_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("SNAKEMAKE_OUTPUT_CACHE", str(tmp_path / "cache" / "built"))
+    monkeypatch.setattr("vermilion.app.lips.run_all", lambda *_, **__: (1, {"face/x": why}))
+    code = correct_lips(
+        str(clip), model=None, scan=None, out=str(tmp_path / "out"), span=(None, None), options=[]
+    )
+    said = capsys.readouterr()
+    assert code == 1 and why not in said.err + said.out
+    assert f"Nothing was made of {clip.name}." in said.err and "Look at" not in said.out
+
+
 def test_a_longer_clip_is_expected_to_take_longer():
     assert expected(300, 300)("apply") > 2 * expected(50, 300)("apply")
     assert expected(3000, 300)("apply") == expected(300, 300)("apply")  # of one job

@@ -9,9 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from vermilion.app import place
-from vermilion.app.face_files import cache_folder, face_model, face_model_before
+from vermilion.app.face_files import (
+    REMEDY,
+    ModelChoice,
+    cache_folder,
+    face_model,
+    face_model_before,
+)
 from vermilion.app.lip_shot import LipShot, frames_of_shot, write_shot
+from vermilion.app.lips_ending import ending
 from vermilion.app.run import run_all
+from vermilion.app.workflow import TELLING
 from vermilion.config.regressors import GENERIC, generic_file
 from vermilion.config.takes import read_takes
 from vermilion.storage.errors import InputError, VermilionError
@@ -70,10 +78,11 @@ def correct_lips(
     results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
     shot = shot.into(results)
     face = face_model(before=face_model_before(shot.configuration), results=results)
+    print(face.said, file=sys.stderr)
     if model == GENERIC:
-        shot = replace(shot, model=_file("model", generic_file(face.section["name"])))
+        shot = replace(shot, model=_generic(face))
     n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
-    print(f"{face.said}\n{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
+    print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
     takes, problems = read_takes(str(Path(results) / "takes.tsv"))
     if problems:
         raise InputError("; ".join(problems), "a take sheet", "Report this.")
@@ -82,12 +91,11 @@ def correct_lips(
         configuration, Path(results), takes, [*options, *_shared()], {},
         expected(n_frames, chunk), alone=True,
     )  # fmt: skip
-    if skipped:
-        print(f"Nothing was made of {source.name}: {skipped[takes[0].name]}", file=sys.stderr)
+    if skipped:  # why was printed when it failed
+        print(f"Nothing was made of {source.name}.", file=sys.stderr)
         return code or 1
-    pages = sorted(Path(results).glob("apply/*/*/lips.html"))
-    for page in pages if code == 0 else []:
-        print(f"Look at: {page}")
+    if code == 0 and not TELLING.intersection(options):
+        print("\n".join(ending(Path(results), takes[0], face, shot.model)))
     return code
 
 
@@ -107,6 +115,17 @@ def expected(n_frames: int, chunk: int) -> Callable[[str], float]:
         return start + each * frames
 
     return seconds
+
+
+def _generic(face: ModelChoice) -> Path:
+    """File of the generic regressor of a face model."""
+    path = Path(generic_file(face.section["name"]))
+    if not path.is_file():
+        raise VermilionError(
+            f"MODEL=generic needs ICT-FaceKit: there is no generic regressor of the face model {face.name}. "
+            f"{REMEDY}, or leave MODEL out."
+        )
+    return path.absolute()
 
 
 def _file(what: str, path: str) -> Path:
