@@ -87,8 +87,8 @@ def face_model(
     except (InputError, OSError) as error:
         if old is not None:
             raise VermilionError(
-                f"{results} was made with ICT-FaceKit, which is not at {old} any more, and {_brief(error)}. "
-                f"{REMEDY}, or give OUT= for a result of its own."
+                f"{results} was made with ICT-FaceKit, which is not at {old} any more and could not be fetched "
+                f"({_brief(error)}). {REMEDY}, or give OUT= for a result of its own."
             ) from error
         return ModelChoice(
             {"name": EMBEDDED},
