@@ -10,15 +10,42 @@ VERMILION = $(BIN)/python -m vermilion.app
 
 .PHONY: help setup demo lips generic run cameras plates sketch doctor report verify clean-intermediate test test-quick test-latest test-faults test-kills test-interchange test-slurm test-cloud lint format docs reference clean
 
+# A variable that is misspelt on the command line would go unnoticed.
+TAKEN := PYTHON VENV CONFIG VIDEO MODEL SCAN OUT FIRST LAST PEOPLE TAKE FORMAT
+# Variables of this file, of make, and of the programs that it starts, which get what the command line sets.
+PASSED := BIN READY LANDMARKS DOCS VERMILION PYTEST MAKE% SHELL GNUMAKEFLAGS PYTHONPATH PYTHONDONTWRITEBYTECODE \
+    HOME PATH TMPDIR LANG LC_% VERMILION_% SNAKEMAKE_% PYTEST_% PIP_% UV_% XDG_% OMP_% NUMBA_% \
+    SSL_% %_proxy %_PROXY
+GIVEN := $(foreach name,$(.VARIABLES),$(if $(filter command,$(firstword $(origin $(name)))),$(name)))
+UNKNOWN := $(strip $(filter-out $(TAKEN) $(PASSED),$(GIVEN)))
+# A make above this one hands on variables of its own.
+ifeq ($(MAKELEVEL),0)
+ifneq ($(UNKNOWN),)
+$(error Nothing here reads $(UNKNOWN); the variables are $(TAKEN). Correct the name (make help says what each is for))
+endif
+endif
+
+# Before the set-up, which takes minutes.
+ifneq ($(filter lips,$(MAKECMDGOALS)),)
+ifeq ($(strip $(VIDEO)),)
+$(error Name a video: make lips VIDEO=clip.mp4)
+endif
+ifeq ($(filter ~%,$(VIDEO))$(shell test -e "$(VIDEO)" || echo absent),absent)
+$(error There is no file or folder $(VIDEO); correct VIDEO)
+endif
+endif
+
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
-	@echo "make lips        better lips for VIDEO=clip.mp4 (MODEL=, SCAN=, OUT=): files and a page"
+	@echo "make lips        better lips for VIDEO=clip.mp4: files and a page (MODEL=generic or FILE.h5,"
+	@echo "                 SCAN=neutral.obj, OUT=folder, FIRST= and LAST= frame)"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
-	@echo "make generic     train the regressor of models/ on sixty synthetic people (MODEL=generic)"
+	@echo "make generic     train the regressor of models/ on sixty synthetic people, or PEOPLE= (MODEL=generic)"
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
 	@echo "make doctor      say what is missing, and what to do about it"
 	@echo "make cameras     say what is understood of the cameras of CONFIG, and draw them"
 	@echo "make plates      frontal images of CONFIG without tattoo, with their camera, for your tracker"
+	@echo "                 (TAKE=subject/take, FORMAT=png|exr|mov, OUT=folder)"
 	@echo "make verify      find and remove damaged results of CONFIG"
 	@echo "make clean-intermediate  remove results of CONFIG that only the next stages read, and say how much that is"
 	@echo "make test        all tests; make test-quick: those that take a minute in all"
@@ -31,6 +58,7 @@ help:
 	@echo "make docs        build the documentation site (results/site); also regenerates the"
 	@echo "                 configuration reference and schemas (make reference: these alone)"
 	@echo "make clean       remove the environment and caches (results stay)"
+	@echo "PYTHON=python3.12  the Python of the environments"
 
 setup: $(READY) $(LANDMARKS)
 

@@ -26,7 +26,7 @@ def page_file(tmp_path_factory):
     frames = np.arange(100, 100 + FRAMES)
     html = take_page(
         TakePage(
-            "a_clip_with_a_rather_long_name_without_spaces", frames, FPS, "How.",
+            "a_clip_with_a_rather_long_name_without_spaces", frames, FPS, "ICT-FaceKit", "none",
             (folder / "shot.mp4").read_bytes(), np.linspace(0, 9, FRAMES), flagged, [],
             "results/lips/clip/config.yaml",
         )
@@ -49,7 +49,7 @@ def test_the_video_plays_and_the_time_line_leads_to_its_frames(chromium, page_fi
     share = (BAD + 0.5) / FRAMES
     line.click(position={"x": left + share * (box["width"] - left - right), "y": 8})
     text = page.locator("#said")
-    sync_api.expect(text).to_have_text(f"frame {100 + BAD}: track: lost")
+    sync_api.expect(text).to_have_text(f"frame {100 + BAD}: tracking: lost")
     page.keyboard.press("ArrowRight")
     sync_api.expect(text).to_have_text(f"frame {100 + BAD + 1}")
     page.click("#play")

@@ -3,11 +3,12 @@
 import zipfile
 
 import pytest
+import yaml
 
-from vermilion.app.face_files import VARIABLE, face_model
+from vermilion.app.face_files import VARIABLE, face_model, face_model_before
 from vermilion.faces.ict_archive import archive_contents
 from vermilion.faces.ict_cache import CONTENT_SHA256, cached_archive, content_sha256, fetch
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import InputError, VermilionError
 
 FILES = {"vertex_indices.json": b"{}", "generic_neutral_mesh.obj": b"v 0 0 0\n"}
 
@@ -47,21 +48,57 @@ def test_another_content_is_not_kept(tmp_path):
 def test_the_users_own_copy_comes_first_then_the_cache(tmp_path):
     own = archive(tmp_path / "own.zip")
     environment = {VARIABLE: str(own), "VERMILION_CACHE": str(tmp_path / "cache")}
-    assert face_model(environment)[0] == {"name": "ict", "path": str(own)}
+    assert face_model(environment).section == {"name": "ict", "path": str(own)}
     kept = cached_archive(tmp_path / "cache")
     kept.parent.mkdir()
     archive(kept)
     del environment[VARIABLE]
-    assert face_model(environment) == ({"name": "ict", "path": str(kept)}, [])
+    found = face_model(environment)
+    assert found.section == {"name": "ict", "path": str(kept)}
+    assert found.name == "ICT-FaceKit" and str(kept) in found.said
 
 
-def test_without_any_of_them_a_sentence_and_the_embedded_model(tmp_path, monkeypatch):
+@pytest.fixture
+def offline(tmp_path, monkeypatch):
+    """Variables of a user without a copy of ICT-FaceKit and without a network."""
+
     def refused(*_, **__):
         raise InputError("no answer", "the archive", "Fetch it by hand.")
 
     monkeypatch.setattr("vermilion.app.face_files.fetch", refused)
-    section, (sentence,) = face_model({"VERMILION_CACHE": str(tmp_path)})
-    assert section == {"name": "procedural"} and "no answer" in sentence
+    return {"VERMILION_CACHE": str(tmp_path / "empty")}
+
+
+def test_without_any_of_them_a_sentence_and_the_embedded_model(offline):
+    found = face_model(offline)
+    assert found.section == {"name": "procedural"}
+    assert "no answer" in found.said and f"export {VARIABLE}=" in found.said
+    assert "embedded (ICT-FaceKit was not found" in found.name
+
+
+def test_a_result_keeps_the_face_model_that_it_was_made_with(offline, tmp_path):
+    own = archive(tmp_path / "own.zip")
+    configuration = tmp_path / "config.yaml"
+    section = {"name": "ict", "path": str(own)}
+    configuration.write_text(yaml.safe_dump({"face_model": section}), encoding="utf-8")
+    found = face_model(offline, face_model_before(configuration), "results/lips/x")
+    assert found.section == section and "with which results/lips/x was made" in found.said
+    asked = face_model({**offline, VARIABLE: "procedural"}, section)
+    assert asked.section == {"name": "procedural"}  # what the user asks for comes first
+
+
+def test_a_result_is_not_overwritten_with_another_face_model(offline, tmp_path):
+    before = {"name": "ict", "path": str(tmp_path / "gone.zip")}
+    with pytest.raises(VermilionError, match=r"gone\.zip any more.*export .*, or give OUT="):
+        face_model(offline, before, "results/lips/x")
+    assert face_model(offline, {"name": "procedural"}).section == {"name": "procedural"}
+
+
+@pytest.mark.parametrize("text", ["", "face_model: 3\n", "a: [\n", "results: x\n"])
+def test_a_configuration_that_tells_no_face_model_is_no_error(tmp_path, text):
+    assert face_model_before(tmp_path / "absent.yaml") is None
+    (tmp_path / "config.yaml").write_text(text, encoding="utf-8")
+    assert face_model_before(tmp_path / "config.yaml") is None
 
 
 def test_a_copy_that_is_not_there_is_an_error():

@@ -5,10 +5,10 @@ import pytest
 import yaml
 
 from vermilion.app.lip_shot import LipShot, take_name, write_shot
-from vermilion.app.lips import expected
+from vermilion.app.lips import correct_lips, expected
 from vermilion.config.load import load_configuration
 from vermilion.imaging.video import write_video
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import InputError, VermilionError
 
 
 @pytest.fixture
@@ -72,6 +72,58 @@ def test_a_configuration_that_somebody_changed_is_kept_beside(clip, tmp_path):
 def test_frames_that_the_clip_does_not_have_are_refused(clip, tmp_path):
     with pytest.raises(InputError, match="frames 0 to 29"):
         write_shot(LipShot(clip, str(tmp_path), {"name": "procedural"}, last=30))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("README.md", "# a text", "no video"),
+        ("notes.mp4", "a text", "unreadable video"),
+        ("empty", None, "without numbered images"),
+        ("gone.mp4", "", "no file or folder"),
+        ("", None, "Name a video: make lips VIDEO=clip.mp4"),
+    ],
+)
+def test_what_is_no_video_stops_before_anything_is_fetched(
+    tmp_path, monkeypatch, name, content, said
+):
+    monkeypatch.setattr("vermilion.app.lips.face_model", lambda **_: pytest.fail("fetched"))
+    source = tmp_path / name if name else ""
+    if name and content is None:
+        source.mkdir()
+    elif content:
+        source.write_text(content)
+    with pytest.raises(VermilionError, match=said):
+        correct_lips(
+            str(source), model=None, scan=None, out=str(tmp_path / "out"), span=(None, None),
+            options=[],
+        )  # fmt: skip
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_generic_regressor_needs_ict_facekit(clip, tmp_path, monkeypatch):
+    monkeypatch.setenv("VERMILION_ICT_FACEKIT", "procedural")
+    with pytest.raises(VermilionError, match="MODEL=generic needs ICT-FaceKit") as raised:
+        correct_lips(
+            str(clip), model="generic", scan=None, out=str(tmp_path / "out"), span=(None, None),
+            options=[],
+        )  # fmt: skip
+    assert "export VERMILION_ICT_FACEKIT=" in str(raised.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_why_nothing_was_made_is_not_said_twice(clip, tmp_path, monkeypatch, capsys):
+    why = "found no usable face"  # `run_workflow` says it, with the log
+    monkeypatch.setenv("VERMILION_ICT_FACEKIT", "procedural")
+    monkeypatch.setenv("VERMILION_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("SNAKEMAKE_OUTPUT_CACHE", str(tmp_path / "cache" / "built"))
+    monkeypatch.setattr("vermilion.app.lips.run_all", lambda *_, **__: (1, {"face/x": why}))
+    code = correct_lips(
+        str(clip), model=None, scan=None, out=str(tmp_path / "out"), span=(None, None), options=[]
+    )
+    said = capsys.readouterr()
+    assert code == 1 and why not in said.err + said.out
+    assert f"Nothing was made of {clip.name}." in said.err and "Look at" not in said.out
 
 
 def test_a_longer_clip_is_expected_to_take_longer():

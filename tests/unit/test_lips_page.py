@@ -19,8 +19,9 @@ def rows(*items):
 def page_of(flagged, opening=(1.0, np.nan, 3.0)):
     return take_page(
         TakePage(
-            "a<b", np.array([100, 101, 102]), 25.0, "How.", b"mp4", np.array(opening), flagged,
+            "a<b", np.array([100, 101, 102]), 25.0, "ICT", "none", b"mp4", np.array(opening), flagged,
             [TakeFile("corrected.usdc", 2_500_000, "the mesh")], "results/x/config.yaml",
+            track="../tracking/C", guide="../bad_take.md",
         )
     )  # fmt: skip
 
@@ -32,11 +33,25 @@ def taken(html):
 def test_marks_are_frames_of_the_video_by_stage():
     html = page_of(rows(("apply", 102, 1, "outside"), ("tracking", 101, 0, "lost</script>")))
     data = taken(html)
-    assert [row["name"] for row in data["rows"]] == ["track", "correction"]
+    assert [row["name"] for row in data["rows"]] == ["tracking", "apply"]
     assert data["rows"][0]["marks"] == [[1, 0, "lost</script>"]]
     assert data["opening"] == [1.0, None, 3.0] and data["first"] == 100
     assert html.count("</script>") == 1  # no reason of a frame ends the script
     assert "a&lt;b" in html and "2.5 MB" in html and "not usable" in html
+
+
+def test_it_says_which_models_were_used_and_where_the_track_lies():
+    html = page_of(rows())
+    assert "Face model: ICT. Correction: none." in html
+    assert "<code>../tracking/C</code>" in html
+
+
+def test_frames_of_one_kind_of_reason_are_one_row():
+    reasons = [rows(("apply", n, 1, f"inner edge {n / 10} times as rough")) for n in (100, 102)]
+    html = page_of(pd.concat(reasons))
+    assert "2 of 3 frames have warnings." in html
+    assert "inner edge 10.0 to 10.2 times as rough" in html and html.count("<tr><td>apply") == 1
+    assert 'href="../bad_take.md"' in html
 
 
 def test_a_clean_take_says_so():

@@ -75,8 +75,15 @@ def exports_to(folder, overlay, timeline, category):
 
 
 def exported_files(folder):
-    """Format -> its file, of those that the configuration asks for and that are one file."""
-    asked = {name: EXPORTED[name] for name in CONFIG.apply.export.formats}
+    """Name -> its file, of what the configuration asks for and that is one file."""
+    options = CONFIG.apply.export
+    asked = {name: EXPORTED[name] for name in options.formats}
+    if CONFIG.tracking.image_fit.enabled:
+        asked["albedo"] = "/albedo.png"
+    if options.live_link:
+        asked["live_link"] = "/live_link.csv"
+    if options.rig:
+        asked["rig"] = "/rig.csv"
     return {name: folder + path for name, path in asked.items() if "." in path}
 
 
@@ -214,13 +221,12 @@ rule apply_export:
         "../scripts/apply/apply_export.py"
 
 
-def how_applied(wildcards):
-    """What moved the lips, as the page of a take says it."""
-    if GIVEN_MODEL:
-        return f"The lips were corrected by the regressor {Path(GIVEN_MODEL).name}."
-    if CONFIG.apply.trains:
-        return f"The lips were corrected by the regressor {apply_regressor(wildcards)}."
-    return "The lips of the track follow the contours in the image; no regressor was applied."
+def face_model_said(wildcards):
+    """The face model of a take's track, as its page says it."""
+    if EXTERNAL:
+        return "that of another tracker"
+    scanned = wildcards.subject in CONFIG.tracking.scans
+    return CONFIG.face_model.title + (", made from a scan of the person" if scanned else "")
 
 
 rule lips_page:
@@ -234,6 +240,7 @@ rule lips_page:
         mesh=P.applied + "/mesh.ply",
         weights=P.applied + "/weights.csv",
         overlay=P.apply_overlay,
+        track=P.coarse_topology,
     output:
         page=P.lips_page,
     log:
@@ -246,7 +253,10 @@ rule lips_page:
     params:
         code=code_of("apply/lips_page"),
         fps=take_fps,
-        how=how_applied,
+        face_model=face_model_said,
+        correction=lambda wildcards: CONFIG.apply.corrected_by(
+            CONFIG.face_model.name, wildcards.subject
+        ),
         only=len(TAKES) == 1,
         # Relative: a project that is moved reruns nothing.
         configuration=", ".join(os.path.relpath(path) for path in workflow.configfiles),

@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
-from vermilion.app.face_files import VARIABLE, cache_folder
+from vermilion.app.face_files import REMEDY, VARIABLE, cache_folder
 from vermilion.faces.ict_cache import cached_archive
 from vermilion.landmarks.mediapipe import environment_python
 from vermilion.storage.errors import InputError
@@ -103,7 +103,8 @@ def landmark_environment(folder: Path) -> Finding:
     except InputError as error:
         return Finding(
             what, "optional", error.brief,
-            f"Run `tools/setup_landmarks.sh {ENVIRONMENT}` (Python 3.9 to 3.12); rendered faces need none.",
+            f"`make lips` does this itself, or run `tools/setup_landmarks.sh {ENVIRONMENT}` (Python 3.9 to "
+            "3.12); rendered faces need none.",
         )  # fmt: skip
     return Finding(what, "good", str(folder))
 
@@ -123,8 +124,8 @@ def face_files() -> Finding:
         return Finding(what, "good", str(kept))
     return Finding(
         what, "optional", "not fetched yet",
-        f"`vermilion lips` fetches ICT-FaceKit (MIT) once; offline, name a copy in {VARIABLE}. Without it "
-        "the embedded model is used.",
+        f"`vermilion lips` fetches ICT-FaceKit (MIT) once; offline, {REMEDY}. Without it the embedded model "
+        "is used.",
     )  # fmt: skip
 
 

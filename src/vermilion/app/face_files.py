@@ -5,14 +5,30 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+import yaml
+
 from vermilion.faces.ict_cache import LICENCE, cached_archive, fetch
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import InputError, VermilionError
 
 #: Folder or archive of ICT-FaceKit; `procedural` asks for the embedded model.
 VARIABLE = "VERMILION_ICT_FACEKIT"
 EMBEDDED = "procedural"
+ICT = "ict"
+REMEDY = (
+    f"`export {VARIABLE}=/path/to/FaceXModel.tar.xz` (the archive, or the folder) and run again"
+)
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """A face model: the section of a configuration, its name for people, a sentence that says where it is from."""
+
+    section: dict[str, str]
+    name: str
+    said: str
 
 
 def cache_folder(environment: Mapping[str, str] = os.environ) -> Path:
@@ -26,15 +42,27 @@ def cache_folder(environment: Mapping[str, str] = os.environ) -> Path:
     return Path(base) / "vermilion"
 
 
-def face_model(environment: Mapping[str, str] = os.environ) -> tuple[dict[str, str], list[str]]:
-    """The section `face_model` of a configuration, and sentences for the user.
+def face_model(
+    environment: Mapping[str, str] = os.environ,
+    before: Mapping[str, str] | None = None,
+    results: str = "",
+) -> ModelChoice:
+    """The face model of a clip: the user's copy, that of the result before, the cache, a download, the embedded one.
+
+    Args:
+        environment: variables of the user.
+        before: the section `face_model` of the configuration that is in the results already: where the user's
+            variable names nothing, ICT-FaceKit of this section is used again.
+        results: the folder that `before` is of, for messages.
 
     Raises:
         InputError: the user's variable names no file or folder.
+        VermilionError: `before` names ICT-FaceKit, which is not there any more and cannot be fetched.
     """
     named = environment.get(VARIABLE, "")
     if named == EMBEDDED:
-        return {"name": EMBEDDED}, []
+        asked = f"embedded ({VARIABLE}={EMBEDDED})"
+        return ModelChoice({"name": EMBEDDED}, asked, f"Face model: {asked}.")
     if named:
         path = Path(named).expanduser().resolve()
         if not path.exists():
@@ -43,19 +71,50 @@ def face_model(environment: Mapping[str, str] = os.environ) -> tuple[dict[str, s
                 "the folder FaceXModel of ICT-FaceKit or an archive of it, or `procedural`",
                 "Correct the variable or unset it.",
             )
-        return {"name": "ict", "path": str(path)}, []
+        return _ict(path, f"{VARIABLE}={named}")
+    old = (
+        Path(before["path"]) if before and before.get("name") == ICT and "path" in before else None
+    )
+    if old is not None and os.access(old, os.R_OK):
+        return _ict(old, f"{old}, with which {results} was made")
     folder = cache_folder(environment)
     kept = cached_archive(folder)
     if kept.is_file():
-        return {"name": "ict", "path": str(kept.resolve())}, []
+        return _ict(kept.resolve(), str(kept))
     try:
         print(f"Fetching the face model once: {LICENCE}.", file=sys.stderr, flush=True)
         path = fetch(folder, tell=_tell)
     except (InputError, OSError) as error:
-        return {"name": EMBEDDED}, [
-            f"The embedded face model is used, which knows fewer people than ICT-FaceKit: {error}"
-        ]
-    return {"name": "ict", "path": str(path.resolve())}, [f"Face model: {LICENCE}; kept in {path}."]
+        if old is not None:
+            raise VermilionError(
+                f"{results} was made with ICT-FaceKit, which is not at {old} any more and could not be fetched "
+                f"({_brief(error)}). {REMEDY}, or give OUT= for a result of its own."
+            ) from error
+        return ModelChoice(
+            {"name": EMBEDDED},
+            f"embedded (ICT-FaceKit was not found; see {VARIABLE} in README)",
+            f"Face model: embedded, which knows fewer people than ICT-FaceKit: {_brief(error)}. "
+            f"For ICT-FaceKit: {REMEDY}.",
+        )
+    return _ict(path.resolve(), f"{path}; {LICENCE}")
+
+
+def face_model_before(configuration: Path) -> dict[str, str] | None:
+    """The section `face_model` of a configuration that is there already; None where it tells none."""
+    try:
+        section = yaml.safe_load(configuration.read_text(encoding="utf-8"))["face_model"]
+        return {str(key): str(value) for key, value in section.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
+        return None
+
+
+def _ict(path: Path, whence: str) -> ModelChoice:
+    section = {"name": ICT, "path": str(path)}
+    return ModelChoice(section, "ICT-FaceKit", f"Face model: ICT-FaceKit ({whence}).")
+
+
+def _brief(error: Exception) -> str:
+    return error.brief if isinstance(error, InputError) else str(error)
 
 
 def _tell(count: int) -> None:

@@ -11,7 +11,9 @@ from pathlib import Path
 import yaml
 
 from vermilion.config.frame_range import frame_range
-from vermilion.imaging.source import is_video
+from vermilion.imaging.frames import list_frames
+from vermilion.imaging.images import IMAGE_SUFFIXES
+from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import write_text
@@ -86,7 +88,7 @@ def write_shot(shot: LipShot, cores: int = 1) -> tuple[int, int]:
     Raises:
         InputError: the source is no video and no folder of images, or has no frames.
     """
-    first, last = _range(shot)
+    first, last = frames_of_shot(shot)
     fps = VideoReader(shot.video).fps if is_video(shot.video) else FOLDER_FPS
     if "\t" in str(shot.video) or "\n" in str(shot.video):
         raise InputError("a tab in the path", "a path without tabs", "Rename it.", path=shot.video)
@@ -109,7 +111,27 @@ def write_shot(shot: LipShot, cores: int = 1) -> tuple[int, int]:
     return n_frames, chunk
 
 
-def _range(shot: LipShot) -> tuple[int, int]:
+def frames_of_shot(shot: LipShot) -> tuple[int, int]:
+    """First and last frame that the user asks for.
+
+    Raises:
+        InputError: the source is no video and no folder of images that can be read, or has not these frames.
+    """
+    if shot.video.is_file() and not is_video(shot.video):
+        raise InputError(
+            "a file that is no video",
+            f"a video ({', '.join(VIDEO_SUFFIXES)}) or a folder of numbered images",
+            "Correct VIDEO, or convert it, for example to H.264 in MP4.",
+            path=shot.video,
+        )
+    is_capture = (shot.video / "frames").is_dir()
+    if shot.video.is_dir() and not is_capture and not list_frames(shot.video):
+        raise InputError(
+            "a folder without numbered images that can be read",
+            f"a video or files such as 000001.png ({', '.join(sorted(IMAGE_SUFFIXES))})",
+            "Correct VIDEO.",
+            path=shot.video,
+        )
     first, last = frame_range(shot.video, "video")
     asked_first = first if shot.first is None else shot.first
     asked_last = last if shot.last is None else shot.last

@@ -5,15 +5,24 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from vermilion.app import place
-from vermilion.app.face_files import cache_folder, face_model
-from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.app.face_files import (
+    REMEDY,
+    ModelChoice,
+    cache_folder,
+    face_model,
+    face_model_before,
+)
+from vermilion.app.lip_shot import LipShot, frames_of_shot, write_shot
+from vermilion.app.lips_ending import ending
 from vermilion.app.run import run_all
+from vermilion.app.workflow import TELLING
 from vermilion.config.regressors import GENERIC, generic_file
 from vermilion.config.takes import read_takes
-from vermilion.storage.errors import InputError
+from vermilion.storage.errors import InputError, VermilionError
 
 #: Rule -> seconds of a job: to start, and of each frame. For the time left alone.
 SECONDS = {
@@ -55,19 +64,24 @@ def correct_lips(
     Raises:
         InputError: a file is not there, or the video cannot be read.
     """
+    if not video:
+        raise VermilionError(
+            "Name a video: make lips VIDEO=clip.mp4 (or a folder of numbered images)."
+        )
     asked = (("model", None if model == GENERIC else model), ("scan", scan))
     given = {name: _file(name, path) for name, path in asked if path}
     source = _file("video", video)
     folder = None if out is None else Path(out).expanduser().absolute()
     project = place.enter_project()
-    section, sentences = face_model()
-    if model == GENERIC:
-        given["model"] = _file("model", generic_file(section["name"]))
-    shot = LipShot(source, "", section, given.get("model"), given.get("scan"), *span)
+    shot = LipShot(source, "", {}, given.get("model"), given.get("scan"), *span)
+    frames_of_shot(shot)  # a video that cannot be read stops here, before anything is fetched
     results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
-    n_frames, chunk = write_shot(shot.into(results), os.cpu_count() or 1)
-    for sentence in sentences:
-        print(sentence, file=sys.stderr)
+    shot = shot.into(results)
+    face = face_model(before=face_model_before(shot.configuration), results=results)
+    print(face.said, file=sys.stderr)
+    if model == GENERIC:
+        shot = replace(shot, model=_generic(face))
+    n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
     print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
     takes, problems = read_takes(str(Path(results) / "takes.tsv"))
     if problems:
@@ -77,12 +91,11 @@ def correct_lips(
         configuration, Path(results), takes, [*options, *_shared()], {},
         expected(n_frames, chunk), alone=True,
     )  # fmt: skip
-    if skipped:
-        print(f"Nothing was made of {source.name}: {skipped[takes[0].name]}", file=sys.stderr)
+    if skipped:  # why was printed when it failed
+        print(f"Nothing was made of {source.name}.", file=sys.stderr)
         return code or 1
-    pages = sorted(Path(results).glob("apply/*/*/lips.html"))
-    for page in pages if code == 0 else []:
-        print(f"Look at: {page}")
+    if code == 0 and not TELLING.intersection(options):
+        print("\n".join(ending(Path(results), takes[0], face, shot.model)))
     return code
 
 
@@ -102,6 +115,17 @@ def expected(n_frames: int, chunk: int) -> Callable[[str], float]:
         return start + each * frames
 
     return seconds
+
+
+def _generic(face: ModelChoice) -> Path:
+    """File of the generic regressor of a face model."""
+    path = Path(generic_file(face.section["name"]))
+    if not path.is_file():
+        raise VermilionError(
+            f"MODEL=generic needs ICT-FaceKit: there is no generic regressor of the face model {face.name}. "
+            f"{REMEDY}, or leave MODEL out."
+        )
+    return path.absolute()
 
 
 def _file(what: str, path: str) -> Path:

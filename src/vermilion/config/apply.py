@@ -163,3 +163,19 @@ class ApplyConfig(StageConfig):
         """
         generic = self.model is None and self.regressor == GENERIC
         return generic_file(face_model) if generic else self.model
+
+    def corrected_by(self, face_model: str, subject: str) -> str:
+        """What corrects the lips of a subject's take, for people.
+
+        Args:
+            face_model: name of the face model of the track.
+        """
+        file = self.file(face_model)
+        if file is None and not self.trains:
+            return "no regressor (contours of the image only)"
+        if file is None:
+            return f"the regressor {self.regressor.replace('{subject}', subject)}"
+        name = file.rpartition("/")[2]
+        if f"models/{name}" == generic_file(face_model):
+            return f"generic ({name}, trained on synthetic people; GR/generic in docs/measures.md)"
+        return f"the regressor {name}"

@@ -71,6 +71,13 @@ class FaceModelConfig(StageConfig):
         0, ge=0, description="Seed of the small asymmetries of the procedural studio head."
     )
 
+    @property
+    def title(self) -> str:
+        """The face model's name, for people."""
+        if self.name == "ict":
+            return "ICT-FaceKit"
+        return "embedded (for ICT-FaceKit, see VERMILION_ICT_FACEKIT in README)"
+
     @model_validator(mode="after")
     def _download_needs_checksum(self) -> FaceModelConfig:
         if self.name == "ict" and not self.path:

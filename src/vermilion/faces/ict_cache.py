@@ -63,7 +63,8 @@ def fetch(
             raise InputError(
                 f"no answer from {url} ({error})",
                 "the archive of ICT-FaceKit",
-                "Fetch it by hand (or clone the repository) and name it in VERMILION_ICT_FACEKIT.",
+                "Fetch it by hand (or clone the repository), then `export VERMILION_ICT_FACEKIT="
+                "/path/to/FaceXModel.tar.xz` (the archive, or the folder) and run again.",
             ) from error
         found = content_sha256(archive_contents(temporary))
         if found != content:

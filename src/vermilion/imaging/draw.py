@@ -125,8 +125,14 @@ def label(image: np.ndarray, text: str) -> np.ndarray:
     image = np.ascontiguousarray(image).copy()
     size = max(0.4, image.shape[1] / 1200)
     place = (6, round(24 * size) + 4)
-    for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(image, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)
+    # The outline is the text itself, shifted: a thicker one is another font, whose letters are wider.
+    around = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
+    for colour, shifts in (((0, 0, 0), around), ((255, 255, 255), [(0, 0)])):
+        for x, y in shifts:
+            shifted = (place[0] + x, place[1] + y)
+            cv2.putText(
+                image, text, shifted, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA
+            )
     return image
 
 

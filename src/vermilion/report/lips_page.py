@@ -11,13 +11,10 @@ import numpy as np
 import pandas as pd
 
 from vermilion.report import page
+from vermilion.report.reason_kinds import by_kind
 
 #: Stages in the order in which they run.
 _STAGES = ("run", "capture", "landmarks", "tracking", "contours", "features", "apply")
-_WHAT = {
-    "run": "left out", "capture": "image", "landmarks": "landmarks", "tracking": "track",
-    "contours": "lip contours", "features": "contour search", "apply": "correction",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,36 +34,45 @@ class TakePage:
         title: name of the take.
         frames: (F,) frame numbers.
         fps: frames a second.
-        how: what moved the lips, as a sentence.
+        face_model: the face model of the track, for people.
+        correction: what corrected the lips, for people.
         video: an MP4 that browsers play, one image a frame.
         opening_mm: (F,) distance of the lips at their middle; NaN where not tracked.
         flagged: rows of the take in quality.tsv: stage, frame, valid, reason.
         files: to take away.
         configuration: file with which one goes on.
+        track: folder of the track's vertices before correction, from the page.
+        guide: link to the page on bad takes; empty: none.
     """
 
     title: str
     frames: np.ndarray
     fps: float
-    how: str
+    face_model: str
+    correction: str
     video: bytes
     opening_mm: np.ndarray
     flagged: pd.DataFrame
     files: Sequence[TakeFile]
     configuration: str
+    track: str = ""
+    guide: str = ""
 
 
 def take_page(found: TakePage) -> str:
     """The page as one string of HTML with everything embedded."""
     count, seconds = len(found.frames), len(found.frames) / found.fps
-    lead = f"{count} frames, {seconds:.1f} s at {found.fps:.4g} frames a second. {found.how}"
+    lead = (
+        f"{count} frames, {seconds:.1f} s at {found.fps:.4g} frames a second. "
+        f"Face model: {found.face_model}. Correction: {found.correction}."
+    )
     return page.page(
         found.title,
         lead,
         [
             ("Video beside result", _player(found) + _timeline(found)),
             ("Warnings", _warnings(found)),
-            ("Files to take away", _files(found.files)),
+            ("Files to take away", _files(found)),
             ("Going on", _going_on(found)),
         ],
     )
@@ -80,7 +86,7 @@ def _player(found: TakePage) -> str:
         "<figcaption>Left the video, right the result; below, the mouth from near.</figcaption></figure>"
         '<p class=bar><button id=play>Play</button><button id=back title="frame before">&lsaquo;</button>'
         '<button id=next title="next frame">&rsaquo;</button><button id=slow>Quarter speed</button> '
-        "<span class=none>Space plays and stops, the arrow keys go frame by frame.</span></p>"
+        "<span class='none keys'>Space plays and stops, the arrow keys go frame by frame.</span></p>"
     )
 
 
@@ -97,7 +103,7 @@ def _timeline(found: TakePage) -> str:
             )
             if int(frame) in position
         ]
-        rows.append({"name": _WHAT.get(stage, stage), "marks": marks})
+        rows.append({"name": stage, "marks": marks})
     opening = [None if not np.isfinite(v) else round(float(v), 2) for v in found.opening_mm]
     data = {
         "first": int(found.frames[0]), "count": len(found.frames), "fps": found.fps,
@@ -107,8 +113,8 @@ def _timeline(found: TakePage) -> str:
     return (
         '<div class=timeline><canvas id=line aria-label="time line of warnings"></canvas>'
         "<p id=said class=none></p></div><p class=legend><i class=bad></i>not usable "
-        "<i class=warn></i>warning <i class=curve></i>opening of the lips, mm. A click goes to the "
-        f"frame.</p><script>const take = {text};\n{_SCRIPT}</script>"
+        "<i class=warn></i>warning <i class=curve></i>opening of the lips, mm. Click the time line to go "
+        f"to a frame.</p><script>const take = {text};\n{_SCRIPT}</script>"
     )
 
 
@@ -121,24 +127,50 @@ def _stages_of(flagged: pd.DataFrame) -> list[str]:
 def _warnings(found: TakePage) -> str:
     if found.flagged.empty:
         return '<p class="none">None: every stage could use every frame.</p>'
-    rows = found.flagged.assign(
-        stage=found.flagged["stage"].map(lambda s: _WHAT.get(s, s)),
-        state=np.where(found.flagged["valid"] == 0, "not usable", "warning"),
+    names = ("stage", "", "frames", "which", "reason, and what to do")
+    heads = "".join(f"<th>{name}</th>" for name in names)
+    body = "".join(
+        f"<tr><td>{page.text(row.stage)}</td><td>{row.state}</td>"
+        f"<td class=n>{row.count}<span class=unit> frames</span></td>"
+        f"<td class=which>{row.which}</td><td class=why>{page.text(row.reason)}"
+        f"<span class=remedy>{page.text(row.remedy)}</span></td></tr>"
+        for row in by_kind(found.flagged)
     )
-    counts = page.frames_of_each(rows, ["stage", "state", "reason"])
-    headings = {
-        "stage": "stage", "state": "", "count": "frames", "which": "which", "reason": "reason"
-    }  # fmt: skip
-    return page.table(counts, headings, "stage")
+    guide = f'<a href="{page.text(found.guide)}">Mend a bad take</a>' if found.guide else ""
+    more = f"<p>{guide} explains each kind of reason.</p>" if guide else ""
+    return (
+        f"<p>{frames_with_warnings(found.flagged, len(found.frames))} Stages are named as in "
+        f"quality.tsv.</p><div class=scroll><table class=kinds><thead><tr>{heads}</tr></thead>"
+        f"<tbody>{body}</tbody></table></div>{more}"
+    )
 
 
-def _files(files: Sequence[TakeFile]) -> str:
+def frames_with_warnings(flagged: pd.DataFrame, count: int) -> str:
+    """`55 of 102 frames have warnings.` of the rows in quality.tsv of a take with `count` frames."""
+    lost = set(flagged.loc[flagged["valid"] == 0, "frame"])
+    warned = set(flagged["frame"]) - lost
+    said = f"{len(warned)} of {count} frames have warnings"
+    return f"{said}, {len(lost)} are not usable." if lost else f"{said}."
+
+
+def _files(found: TakePage) -> str:
     lines = "".join(
         f'<tr><td><a href="{page.text(f.link)}">{page.text(f.link.rpartition("/")[2])}</a></td>'
         f"<td>{page.text(f.what)}</td><td class=n>{_size(f.size_bytes)}</td></tr>"
-        for f in files
+        for f in found.files
     )
-    return f'<div class="scroll"><table><tbody>{lines}</tbody></table></div>'
+    track = (
+        "<p>The track before correction is the middle panel of overlay.mp4. Its vertices are in "
+        f"<code>{page.text(found.track)}</code> (NumPy, a file for each chunk of frames, and topology.ply); "
+        "docs/start/video.md writes them as OBJ files.</p>"
+        if found.track
+        else ""
+    )
+    return (
+        f'<div class="scroll"><table class=files><tbody>{lines}</tbody></table></div>{track}'
+        "<p class=none>Beside these files lie timeline.png (the warnings as an image) and what the next run "
+        "goes on from: chunks/ and quality/.</p>"
+    )
 
 
 def _size(size_bytes: int) -> str:
@@ -165,7 +197,14 @@ figure.shot { margin: 12px 0; } figure.shot video { width: 100%; max-height: 78v
 .legend { font-size: 13px; color: var(--soft); } .legend i { display: inline-block; width: 10px;
   height: 10px; margin: 0 5px 0 12px; border-radius: 2px; } .legend i:first-child { margin-left: 0; }
 .bad { background: #b3362a; } .warn { background: #e0a63a; } .curve { background: #2a6f97; }
-@media (max-width: 500px) { main { padding: 20px 14px 60px; } h1 { font-size: 24px; overflow-wrap: anywhere; } }
+.remedy { display: block; color: var(--soft); } .remedy:empty { display: none; } .unit { display: none; }
+.kinds .which { min-width: 9em; } .files td:first-child, .files .n { white-space: nowrap; }
+@media (pointer: coarse) { .keys { display: none; } }
+@media (max-width: 600px) { main { padding: 20px 14px 60px; } h1 { font-size: 24px; overflow-wrap: anywhere; }
+  .keys, .kinds thead { display: none; } .kinds, .kinds tbody, .files, .files tbody { display: block; }
+  .kinds tr, .files tr { display: block; padding: 8px 0; border-bottom: 1px solid var(--line); }
+  .kinds td, .files td { display: inline-block; border: 0; padding: 0 10px 0 0; text-align: left; }
+  .kinds td.which, .kinds td.why, .files td:nth-child(2) { display: block; } .unit { display: inline; } }
 </style>"""
 
 _SCRIPT = """

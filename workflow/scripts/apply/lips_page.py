@@ -17,16 +17,23 @@ from vermilion.tracking.result import TrackedTake
 
 #: Input -> what the file is, and what opens it.
 FILES = {
-    "usd": "the corrected mesh, animated: Blender, Maya, Unreal, Houdini",
+    "usd": "the corrected mesh, animated: Blender (File > Import > Universal Scene Description), Maya, Unreal, "
+    "Houdini",
+    "albedo": "the skin's texture, which the mesh files name: copy it with them",
     "usd_shapes": "the same as blend shapes (UsdSkel)",
     "gltf": "the same as morph targets: Blender, Unity, web browsers",
     "alembic": "the same as Alembic",
-    "weights": "blend shape weights a frame, ARKit names: Live Link, spreadsheets",
+    "live_link": "ARKit's 52 weights of the corrected face, as Live Link Face writes them",
+    "rig": "weights of your rig for the corrected face",
+    "weights": "weights of the track, before correction, by the face model's shape names; for corrected ARKit "
+    "weights set apply.export.live_link: true",
     "overlay": "original, track and result side by side",
-    "corrected": "the vertices of all frames: NumPy (frames, vertices, 3), mm",
+    "corrected": "the corrected vertices of all frames: NumPy (frames, vertices, 3), mm",
     "mesh": "the triangles to these vertices",
     "quality": "every flagged frame with its reason",
 }
+#: Explains each kind of reason; from the project's folder.
+GUIDE = "docs/howto/bad_take.md"
 
 
 def opening_of(face, sequence, valid):
@@ -53,12 +60,15 @@ def main(snakemake):
         title=take if params.only else f"{subject}/{take}",
         frames=fit.frames,
         fps=params.fps,
-        how=params.how,
+        face_model=params.face_model,
+        correction=params.correction,
         video=page_video(inputs.overlay, params.fps),
         opening_mm=opening_of(face, read_sequence(inputs.corrected), fit.valid),
         flagged=flagged[own],
         files=files,
         configuration=params.configuration,
+        track=os.path.relpath(Path(inputs.track).parent, folder),
+        guide=os.path.relpath(GUIDE, folder) if Path(GUIDE).is_file() else "",
     )
     write_text(snakemake.output.page, take_page(found))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from vermilion.geometry.camera import Camera, read_cameras
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.landmarks.sets import IBUG66
+from vermilion.storage.errors import InputError
 from vermilion.storage.frames import evenly_spaced
 from vermilion.storage.json_files import load_json
 from vermilion.tracking.identity.landmark_identity import TakeSample
@@ -47,12 +49,16 @@ def sample_takes(
         landmarks: landmark files of all takes, take by take.
         cameras, calibrations: folder of cameras and summary of the calibration, one a take.
         count: wanted number of frames, over all takes.
+
+    Raises:
+        InputError: no frame of any take has a face that can be used.
     """
     paths: Iterator[str] = iter(landmarks)
     tracks = {
         row["take"]: LandmarkTrack.load([next(paths) for _ in range(row["chunks"])])
         for row in takes
     }
+    _require_a_face(tracks, landmarks)
     chosen = spread_frames({name: track.valid for name, track in tracks.items()}, count)
     found = []
     for row, folder, summary in zip(takes, cameras, calibrations, strict=True):
@@ -65,6 +71,19 @@ def sample_takes(
         sample = TakeSample(name, seen, focal_px(camera), calibrated, neutral)
         found.append(SampledFrames(sample, camera, frames))
     return found
+
+
+def _require_a_face(tracks: Mapping[str, LandmarkTrack], landmarks: Sequence[str]) -> None:
+    if any(track.valid.any() for track in tracks.values()):
+        return
+    count = sum(len(track.valid) for track in tracks.values())
+    folders = sorted({Path(path).parent.as_posix() for path in landmarks})
+    raise InputError(
+        f"no usable face in any of {count} frames of {', '.join(tracks)}",
+        "a face in at least one",
+        f"See {', '.join(f'{folder}/overlay' for folder in folders)}; the reason of each frame is in the "
+        "folder quality beside it.",
+    )
 
 
 def tells_lips(landmarks: list[str]) -> bool:
