@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
-from vermilion.correction.surface_quality import LipSurface, parabola_residuals
+from vermilion.correction.surface_quality import SEEN_MM, LipSurface, parabola_residuals
 from vermilion.geometry.mesh import adjacency
 
 from .test_image_contours import CAMERA, FACE
@@ -71,6 +71,32 @@ def test_teeth_in_the_inner_edge_are_rough_and_another_opening_is_not(lips):
     wider = base.copy()
     wider[:, 1] += side * 2.0 * np.clip(1 - (base[:, 0] / 20) ** 2, 0, None)
     assert quality(lips, wider, base).roughness_ratio[0] < 1.3
+
+
+def test_the_inside_of_a_corner_that_the_upper_lip_hides_is_no_edge(lips):
+    base = lip_patch.vertices_at(4.0, 0.0)
+    row = np.arange(FACE.n_vertices) // lip_patch.COLUMNS
+    corner = (base[:, 0] < -13) & (base[:, 0] > -19) & (base[:, 1] < 0)
+    hidden = base.copy()
+    hidden[corner & (row < lip_patch.INNER_ROWS)] += np.array([0.0, 12.0, -6.0])
+    found = quality(lips, hidden, base)
+    assert np.nanmax(lips.visible_edges_mm(hidden, CAMERA)[1]) < 0
+    assert found.roughness_mm[0] < 1.3 * found.base_roughness_mm[0]
+
+
+def test_an_edge_that_nobody_sees_to_be_rough_is_not_told(lips):
+    base = lip_patch.vertices_at(1.8, 0.0)
+    fine, seen = base.copy(), base.copy()
+    fine[:, 1] += 0.06 * np.cos(2.5 * base[:, 0])
+    seen[:, 1] += 0.3 * np.cos(2.5 * base[:, 0])
+    assert quality(lips, fine, base).roughness_ratio[0] > 1.3
+    assert (
+        quality(lips, fine, base).roughness_mm[0]
+        < SEEN_MM
+        < quality(lips, seen, base).roughness_mm[0]
+    )
+    assert quality(lips, fine, base).reasons() == [""]
+    assert quality(lips, seen, base).reasons() != [""]
 
 
 def test_a_parabola_leaves_nothing():

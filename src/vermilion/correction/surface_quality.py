@@ -30,8 +30,11 @@ HIDDEN_SHARE = 0.002
 _COLUMNS, _FROM, _TO = 71, 0.15, 0.85
 #: Its roughness is what a parabola over so many columns to either side leaves of it.
 _REACH = 12
-#: The edge counts as rough from this multiple of the base track's.
+#: The edge counts as rough from this multiple of the base track's, ...
 ROUGH = 1.3
+#: ... unless it is smoother than this (mm; a quarter of a pixel at a mouth of 120 px): nobody sees that, and of
+#: the track's 0.03 mm twice as much is nothing.
+SEEN_MM = 0.1
 
 
 @dataclass(frozen=True)
@@ -65,19 +68,24 @@ class SurfaceQuality:
         """(F,) roughness of the inner edge over that of the base track."""
         return self.roughness_mm / np.maximum(self.base_roughness_mm, 1e-9)
 
+    @property
+    def rough(self) -> np.ndarray:
+        """(F,) bool: the inner edge is rougher than the base track's, as one sees."""
+        return (self.roughness_ratio > ROUGH) & (self.roughness_mm > SEEN_MM)
+
     def __getitem__(self, rows: np.ndarray | slice) -> SurfaceQuality:
         return SurfaceQuality(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def reasons(self) -> list[str]:
         """What is wrong of each frame, F sentences; empty where nothing is."""
         found = []
-        for folded, hidden, ratio in zip(
-            self.folded, self.hidden_share, self.roughness_ratio, strict=True
+        for folded, hidden, rough, ratio in zip(
+            self.folded, self.hidden_share, self.rough, self.roughness_ratio, strict=True
         ):
             parts = [f"{folded} lip triangles flipped or folded"] if folded else []
             if hidden > HIDDEN_SHARE:
                 parts.append(f"inner mouth in front of {hidden:.1%} of the vermilion")
-            if ratio > ROUGH:
+            if rough:
                 parts.append(f"inner edge {ratio:.1f} times as rough as the base track's")
             found.append("; ".join(parts))
         return found
@@ -134,7 +142,7 @@ class LipSurface:
 
         Returns:
             (2, columns) mm at the mouth's distance, above the line through the corners; NaN where a lip has
-            none.
+            none, and of the lower lip where the upper one hides it: closed lips, the inside of the corners.
         """
         ids = np.unique(np.concatenate([self._corners, *(e.ravel() for e in self._edges)]))
         pixels = np.full((len(vertices_mm), 2), np.nan)
@@ -153,6 +161,7 @@ class LipSurface:
             share = (columns[:, None] - start) / np.maximum(end - start, 1e-9)
             crossing = np.where((share >= 0) & (share <= 1), low + share * (high - low), np.nan)
             result[row] = extreme.reduce(crossing, axis=1, initial=np.nan)
+        result[1, result[1] > result[0]] = np.nan
         mm_per_px = (
             np.linalg.norm(vertices_mm[self._corners[1]] - vertices_mm[self._corners[0]]) / width
         )
