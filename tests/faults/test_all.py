@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from tests.conftest import ROOT
 from tests.faults.case import MOST_BYTES, MOST_SECONDS
 from tests.faults.memory import MODULES, cases
@@ -15,6 +17,7 @@ def test_there_are_at_least_a_hundred_and_each_has_its_own_name():
     assert len(names) == len(set(names)) >= 100
 
 
+@pytest.mark.slow
 def test_heavy_inputs_stay_under_a_gigabyte_in_a_process_of_their_own():
     done = subprocess.run(
         [sys.executable, "-m", "tests.faults.memory"],

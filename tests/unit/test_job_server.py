@@ -43,6 +43,15 @@ def server():
     made.close()
 
 
+@pytest.fixture(scope="module")
+def light_server():
+    """One that has little to load, and to take apart where a job fails."""
+    made = JobServer(libraries=["numpy"])
+    until(lambda: made.ready)
+    yield made
+    made.close()
+
+
 def test_job_sees_what_it_sees_in_a_python_of_its_own(server, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     environment = {"PATH": os.environ["PATH"], "OF_THE_JOB": "1"}
@@ -81,10 +90,10 @@ def test_libraries_start_no_threads_that_a_fork_would_lose(server, tmp_path):
     ("text", "status"),
     [("raise SystemExit(3)", 3), ("1 / 0", 1), ("import os, signal; os.kill(os.getpid(), 9)", -9)],
 )
-def test_status_of_a_failed_job_is_told(server, tmp_path, text, status):
+def test_status_of_a_failed_job_is_told(light_server, tmp_path, text, status):
     script = script_of(tmp_path, text)
     with pytest.raises(subprocess.CalledProcessError, match=r"job\.py") as told:
-        server.run(script, dict(os.environ))
+        light_server.run(script, dict(os.environ))
     assert told.value.returncode == status
 
 
@@ -117,7 +126,7 @@ def test_job_that_fails_says_nothing_but_its_own_error(tmp_path):
         """
         import os, subprocess, sys, time
         from vermilion.app.job_server import JobServer
-        server = JobServer()
+        server = JobServer(libraries=["OpenImageIO"])  # says what it did not take apart
         while not server.ready: time.sleep(0.01)
         try:
             server.run(sys.argv[1], dict(os.environ))
@@ -180,14 +189,14 @@ def test_fork_that_fails_is_told(monkeypatch):
     assert not thread.is_alive()
 
 
-def test_jobs_run_beside_each_other(server, tmp_path):
+def test_jobs_run_beside_each_other(light_server, tmp_path):
     wait = f"""
         import pathlib, sys, time
         pathlib.Path(sys.argv[0] + ".here").touch()
         while len(list(pathlib.Path({str(tmp_path)!r}).glob("*.here"))) < 2: time.sleep(0.01)
     """
     threads = [
-        threading.Thread(target=server.run, args=(script_of(tmp_path, wait, name), {}))
+        threading.Thread(target=light_server.run, args=(script_of(tmp_path, wait, name), {}))
         for name in ("a.py", "b.py")
     ]
     for thread in threads:

@@ -5,6 +5,8 @@ import subprocess
 import sys
 import textwrap
 
+import pytest
+
 MODULE = """
     import math
     import sys
@@ -66,6 +68,7 @@ def compilations(folder):
     return [int(text) for text in [*printed, after.stdout]]
 
 
+@pytest.mark.slow
 def test_one_process_compiles_and_no_other_then_or_later(tmp_path):
     *together, after = compilations(tmp_path)
     assert sorted(together) == [0, 1]

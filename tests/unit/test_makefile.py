@@ -67,6 +67,6 @@ def test_the_variables_that_it_reads_are_taken(words):
 
 
 def test_variables_of_a_make_above_are_not_refused(tmp_path):
-    (tmp_path / "Makefile").write_text(f"all:\n\t+$(MAKE) -n -C {PROJECT} help\n")
+    (tmp_path / "Makefile").write_text(f"all:\n\t+$(MAKE) -n -C '{PROJECT}' help\n")
     run = make("all", "COLOUR=red", folder=tmp_path)
     assert run.returncode == 0, run.stderr

@@ -160,8 +160,9 @@ def estimate_appearance(
 
 
 def median_colour(colours: np.ndarray, trust: np.ndarray) -> np.ndarray:
-    """Median (3,) of `colours` (..., 3) where `trust` (...,) is high."""
-    return np.median(colours[trust > 0.3 * trust.max(initial=0.0)], axis=0)
+    """Median (3,) of `colours` (..., 3) where `trust` (...,) is high; black where nothing is trusted."""
+    trusted = colours[trust > 0.3 * trust.max(initial=0.0)]
+    return np.median(trusted, axis=0) if len(trusted) else np.zeros(3)
 
 
 @dataclass(frozen=True)
