@@ -35,7 +35,7 @@ def test_it_names_the_models_the_warnings_and_what_opens_the_files(results):
     text = said(results, None)
     assert "Face model: ICT-FaceKit\n" in text
     assert "Correction: no regressor (contours of the image only)\n" in text
-    assert "1 of 10 frames have warnings.\n" in text
+    assert "1 of 10 frames has a warning.\n" in text
     assert "lips.html (open in a browser)\n" in text
     assert "corrected.usdc (File > Import > Universal Scene Description; copy albedo.png" in text
 

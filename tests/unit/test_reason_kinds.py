@@ -56,7 +56,7 @@ def test_many_ranges_are_shortened():
 
 def test_frames_are_counted_once_and_unusable_ones_apart():
     table = rows(("a", 1, 1, "x"), ("b", 1, 1, "y"), ("a", 2, 0, "z"), ("b", 2, 1, "y"))
-    assert frames_with_warnings(table, 9) == "1 of 9 frames have warnings, 1 are not usable."
+    assert frames_with_warnings(table, 9) == "1 of 9 frames has a warning, 1 is not usable."
     assert frames_with_warnings(rows(), 9) == "0 of 9 frames have warnings."
 
 
