@@ -8,7 +8,8 @@ import pandas as pd
 from vermilion.report.lips_page import frames_with_warnings
 from vermilion.report.reason_kinds import REMEDIES, by_kind, shortened_spans
 
-GUIDE = Path(__file__).parents[2] / "docs" / "howto" / "bad_take.md"
+PROJECT = Path(__file__).parents[2]
+GUIDE = PROJECT / "docs" / "howto" / "bad_take.md"
 
 
 def rows(*items):
@@ -63,3 +64,13 @@ def test_frames_are_counted_once_and_unusable_ones_apart():
 def test_the_guide_explains_each_kind_of_reason():
     guide = GUIDE.read_text(encoding="utf-8")
     assert [said for said, _ in REMEDIES if said not in guide] == []
+
+
+def test_each_kind_of_reason_is_said_somewhere():
+    sources = "".join(
+        path.read_text(encoding="utf-8")
+        for folder in ("src", "workflow")
+        for path in (PROJECT / folder).rglob("*.py")
+        if path.name != "reason_kinds.py"
+    )
+    assert [said for said, _ in REMEDIES if said not in sources] == []

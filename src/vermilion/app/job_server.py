@@ -273,9 +273,8 @@ class _LastStep:
 
     def __call__(self) -> None:
         if self.succeeded:
-            with contextlib.suppress(
-                OSError, ValueError
-            ):  # else Python says so, and gives the status
+            # Where the last words cannot be written, Python says so and gives the status.
+            with contextlib.suppress(OSError, ValueError):
                 sys.stdout.flush()
                 sys.stderr.flush()
                 os._exit(0)

@@ -149,12 +149,11 @@ def frames_with_warnings(flagged: pd.DataFrame, count: int) -> str:
     """`55 of 102 frames have warnings.` of the rows in quality.tsv of a take with `count` frames."""
     lost = set(flagged.loc[flagged["valid"] == 0, "frame"])
     warned = set(flagged["frame"]) - lost
-    said = f"{len(warned)} of {count} frames {'has a warning' if len(warned) == 1 else 'have warnings'}"
-    return (
-        f"{said}, {len(lost)} {'is' if len(lost) == 1 else 'are'} not usable."
-        if lost
-        else f"{said}."
-    )
+    verb = "has a warning" if len(warned) == 1 else "have warnings"
+    said = f"{len(warned)} of {count} frames {verb}"
+    if lost:
+        said += f", {len(lost)} {'is' if len(lost) == 1 else 'are'} not usable"
+    return f"{said}."
 
 
 def _files(found: TakePage) -> str:

@@ -52,7 +52,8 @@ class FlaggedKind:
     Attributes:
         stage: as in quality.tsv.
         state: `not usable` or `warning`.
-        count: number of frames; which: their numbers.
+        count: number of frames.
+        which: their numbers, as ranges.
         reason: with the range of each figure.
         remedy: what to do; empty where the reason says it itself.
     """
