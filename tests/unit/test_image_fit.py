@@ -46,6 +46,13 @@ def test_harmonics_jacobian_is_their_derivative():
         assert np.abs(slope - harmonics_jacobian(normals)[..., axis]).max() < 1e-4
 
 
+def test_many_display_values_are_those_of_single_ones():
+    light = np.append(np.random.default_rng(2).uniform(-0.1, 2.0, 30_000), [0.0031308, 0.0, np.nan])
+    values = to_display_values(light)
+    single = np.concatenate([to_display_values(part) for part in np.array_split(light, 30)])
+    assert np.allclose(values, single, rtol=0, atol=1e-10, equal_nan=True)
+
+
 def test_display_slope_is_the_curves_derivative():
     light = np.linspace(0.01, 0.9, 50)
     slope = (to_display_values(light + 1e-7) - to_display_values(light)) / 1e-7
