@@ -140,6 +140,19 @@ def test_a_script_is_run_by_one_rule_with_its_own_fingerprint(path):
     )
 
 
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
+def test_a_key_that_a_script_reads_is_listed_by_its_rule(path):
+    read = set(re.findall(r'cfg\["([a-z_]+\.[a-z_.]+)"\]', path.read_text()))
+    files = "".join(rules.read_text() for rules in RULES)
+    for body in re.split(r"^ *rule ", files, flags=re.MULTILINE)[1:]:
+        if f"/{path.parent.name}/{path.name}" not in body or "cfg=cfg_of(" not in body:
+            continue
+        for shared in re.findall(r"\*([A-Z_]+)", body):  # keys of several rules: a tuple
+            body += re.search(rf"^{shared} = .*(?:\n    .*|\n[)\]])*", files, re.MULTILINE)[0]
+        listed = set(re.findall(r'"([a-z_.]+)"', body))  # or only the last part, below one section
+        assert {key for key in read if not listed & {key, key.rpartition(".")[2]}} == set()
+
+
 @pytest.mark.slow
 def test_wrong_configuration_stops_before_any_job(fresh_project):
     run = fresh_project.snakemake("--config", "chunk_frames=none", "results=", check=False)

@@ -150,7 +150,13 @@ rule apply:
         mem_mb=growing(1500),
         runtime=growing(60),
     params:
-        cfg=cfg_of("apply.overlay", "correction.integration", "correction.image", *MASK_KEYS),
+        cfg=cfg_of(
+            "apply.overlay",
+            "correction.integration",
+            "correction.image",
+            "evaluation.measures.surface",
+            *MASK_KEYS,
+        ),
         code=code_of("apply/apply"),
         frames=chunk_frames,
         fps=take_fps,
