@@ -1,10 +1,12 @@
 """The graph of jobs: truth stays in the evaluation, and parameters hold what a rule reads."""
 
+import io
 import json
 import re
 
 import pytest
 
+from vermilion.app.workflow import run_workflow
 from vermilion.provenance.fingerprint import imported_files
 
 from .conftest import ROOT, Project
@@ -161,3 +163,19 @@ def test_wrong_configuration_stops_before_any_job(fresh_project):
     assert "2 problem(s) in the configuration" in printed
     assert "key chunk_frames: found" in printed and "key results: found" in printed
     assert "Job stats" not in printed
+
+
+@pytest.mark.slow
+def test_a_detector_that_nothing_trains_is_one_sentence_where_landmarks_are_needed(
+    fresh_project, tmp_path, monkeypatch
+):
+    without = ("--config", "landmarks={training_takes: []}")
+    assert "captures" in fresh_project.would_run("captures", *without)
+    monkeypatch.chdir(fresh_project.folder)
+    monkeypatch.setenv("PYTHONPATH", fresh_project.environment()["PYTHONPATH"])
+    terminal = io.StringIO()
+    assert run_workflow(fresh_project.command(*without), tmp_path / "s.log", stream=terminal) == 1
+    told = terminal.getvalue().partition("\n\n")[2].strip().splitlines()
+    assert "config/tiny.yaml, key landmarks.training_takes: found none; expected" in told[0]
+    assert told[0].endswith("`mediapipe` is for real faces.")
+    assert told[1:] == [f"Log: {tmp_path / 's.log'}"]
