@@ -28,7 +28,7 @@ endif
 # Before the set-up, which takes minutes.
 ifneq ($(filter lips,$(MAKECMDGOALS)),)
 ifeq ($(strip $(VIDEO)),)
-$(error Name a video: make lips VIDEO=clip.mp4)
+$(error Name a video: make lips VIDEO=clip.mp4 (or an image, or a folder of numbered images))
 endif
 ifeq ($(filter ~%,$(VIDEO))$(shell test -e "$(VIDEO)" || echo absent),absent)
 $(error There is no file or folder $(VIDEO); correct VIDEO)

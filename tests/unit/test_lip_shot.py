@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import yaml
 
+from vermilion.app.frame_megapixels import frame_megapixels
 from vermilion.app.lip_shot import LipShot, take_name, write_shot
 from vermilion.app.lips import correct_lips, expected
 from vermilion.config.load import load_configuration
+from vermilion.config.studio import StudioConfig
+from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
 from vermilion.storage.errors import InputError, VermilionError
 
@@ -49,6 +52,19 @@ def test_the_workflow_takes_what_is_written(clip, tmp_path):
     assert take.fps == pytest.approx(29.97, abs=0.01)
 
 
+def test_a_photograph_is_a_take_of_one_frame(tmp_path):
+    photo = tmp_path / "Größe.jpg"
+    write_srgb8(photo, np.full((96, 54, 3), 90, np.uint8))
+    shot = LipShot(photo, str(tmp_path / "out"), {"name": "procedural"})
+    assert shot.take == "groesse" and write_shot(shot)[0] == 1
+    raw = yaml.safe_load(shot.configuration.read_text(encoding="utf-8"))
+    _, (take,) = load_configuration(raw, "config.yaml")
+    assert take.source == str(photo) and (take.first, take.last) == (0, 0)
+    assert frame_megapixels(take, StudioConfig()) == [pytest.approx(96 * 54 / 1e6)]
+    with pytest.raises(InputError, match="frames 0 to 0"):
+        write_shot(LipShot(photo, str(tmp_path / "out"), {"name": "procedural"}, last=1))
+
+
 def test_without_a_model_nothing_is_learnt(clip, tmp_path):
     shot = LipShot(clip, str(tmp_path / "out"), {"name": "procedural"}, last=9)
     assert write_shot(shot) == (10, 50)
@@ -79,6 +95,7 @@ def test_frames_that_the_clip_does_not_have_are_refused(clip, tmp_path):
     [
         ("README.md", "# a text", "no video"),
         ("notes.mp4", "a text", "unreadable video"),
+        ("notes.jpg", "a text", "unreadable image"),
         ("empty", None, "without numbered images"),
         ("gone.mp4", "", "no file or folder"),
         ("", None, "Name a video: make lips VIDEO=clip.mp4"),

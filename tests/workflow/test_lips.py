@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
 
 from .conftest import Project
@@ -19,14 +20,21 @@ TRACK = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def shot(fresh_project, tmp_path):
-    """A project whose configuration is that of a clip with a space and an umlaut in its path."""
+def write_clip(path):
+    write_video(path, [np.full((64, 48, 3), 90, np.uint8)] * 12, 25.0)
+
+
+def write_photo(path):
+    write_srgb8(path, np.full((64, 48, 3), 90, np.uint8))
+
+
+def lips_of(fresh_project, tmp_path, name, write):
+    """A project whose configuration is that of a file, and options of Snakemake."""
     environment = tmp_path / "landmarks" / "bin"
     environment.mkdir(parents=True)
     (environment / "python").symlink_to(sys.executable)  # a dry run does not start it
-    clip = tmp_path / "Größe 1.mp4"
-    write_video(clip, [np.full((64, 48, 3), 90, np.uint8)] * 12, 25.0)
+    clip = tmp_path / name
+    write(clip)
     results = tmp_path / "out put"
     write_shot(LipShot(clip, str(results), {"name": "procedural"}))
     project = Project(fresh_project.folder, str(results / "config.yaml"))
@@ -36,10 +44,22 @@ def shot(fresh_project, tmp_path):
     return project, ("--config", f"landmarks={place}")
 
 
+@pytest.fixture
+def shot(fresh_project, tmp_path):
+    """That of a clip with a space and an umlaut in its path."""
+    return lips_of(fresh_project, tmp_path, "Größe 1.mp4", write_clip)
+
+
 @pytest.mark.slow
 def test_contours_alone_run_nothing_that_learns_or_measures(shot):
     project, options = shot
     assert set(project.would_run(*options)) == TRACK
+
+
+@pytest.mark.slow
+def test_a_photograph_takes_the_path_of_a_video(fresh_project, tmp_path):
+    project, options = lips_of(fresh_project, tmp_path, "Größe 1.jpg", write_photo)
+    assert set(project.would_run(*options)) == TRACK - {"video_facts"}
 
 
 @pytest.mark.slow

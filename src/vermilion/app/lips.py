@@ -66,7 +66,7 @@ def correct_lips(
     """
     if not video:
         raise VermilionError(
-            "Name a video: make lips VIDEO=clip.mp4 (or a folder of numbered images)."
+            "Name a video: make lips VIDEO=clip.mp4 (or an image, or a folder of numbered images)."
         )
     asked = (("model", None if model == GENERIC else model), ("scan", scan))
     given = {name: _file(name, path) for name, path in asked if path}
