@@ -4,12 +4,15 @@ import json
 import os
 import sys
 
+import h5py
 import numpy as np
 import pytest
 
 from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.faces.build import TRACKER_TOPOLOGIES
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
+from vermilion.regression.model import FORMAT, FORMAT_VERSION
 
 from .conftest import Project
 
@@ -71,6 +74,12 @@ def test_a_model_of_another_run_is_an_input_and_nothing_is_trained(shot, tmp_pat
     run = project.snakemake("--dry-run", *options, f"apply={apply}")
     assert f", {model}" in run.stdout + run.stderr
     assert "rule train" not in run.stdout + run.stderr
+    with h5py.File(model, "w") as file:
+        topology = TRACKER_TOPOLOGIES["ict"]
+        file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, topology_sha256=topology)
+    other = project.snakemake("--dry-run", *options, f"apply={apply}", check=False)
+    told = f"key apply.model: found {model}, which was trained for the face model ICT-FaceKit"
+    assert other.returncode and told in other.stdout + other.stderr
     os.unlink(model)
     missing = project.snakemake("--dry-run", *options, f"apply={apply}", check=False)
     assert missing.returncode and str(model) in missing.stdout + missing.stderr

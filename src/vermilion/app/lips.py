@@ -16,6 +16,7 @@ from vermilion.app.face_files import (
     face_model,
     face_model_before,
 )
+from vermilion.app.lip_regressor import check_regressor
 from vermilion.app.lip_shot import LipShot, frames_of_shot, write_shot
 from vermilion.app.lips_ending import ending
 from vermilion.app.run import run_all
@@ -81,6 +82,8 @@ def correct_lips(
     print(face.said, file=sys.stderr)
     if model == GENERIC:
         shot = replace(shot, model=_generic(face))
+    if shot.model is not None:
+        check_regressor(shot.model, face)
     n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
     print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
     takes, problems = read_takes(str(Path(results) / "takes.tsv"))
