@@ -37,7 +37,7 @@ endif
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
-	@echo "make lips        better lips for VIDEO=clip.mp4: files and a page (MODEL=generic or FILE.h5,"
+	@echo "make lips        better lips for VIDEO=clip.mp4 or photo.jpg: files and a page (MODEL=generic or FILE.h5,"
 	@echo "                 SCAN=neutral.obj, OUT=folder, FIRST= and LAST= frame)"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make generic     train the regressor of models/ on sixty synthetic people, or PEOPLE= (MODEL=generic)"

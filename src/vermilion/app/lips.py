@@ -85,7 +85,8 @@ def correct_lips(
     if shot.model is not None:
         check_regressor(shot.model, face)
     n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
-    print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
+    frames = "1 frame" if n_frames == 1 else f"{n_frames} frames"
+    print(f"{frames} of {source.name} -> {results}", file=sys.stderr)
     takes, problems = read_takes(str(Path(results) / "takes.tsv"))
     if problems:
         raise InputError("; ".join(problems), "a take sheet", "Report this.")
