@@ -28,7 +28,7 @@ endif
 # Before the set-up, which takes minutes.
 ifneq ($(filter lips,$(MAKECMDGOALS)),)
 ifeq ($(strip $(VIDEO)),)
-$(error Name a video: make lips VIDEO=clip.mp4)
+$(error Name a video: make lips VIDEO=clip.mp4 (or an image, or a folder of numbered images))
 endif
 ifeq ($(filter ~%,$(VIDEO))$(shell test -e "$(VIDEO)" || echo absent),absent)
 $(error There is no file or folder $(VIDEO); correct VIDEO)
@@ -37,7 +37,7 @@ endif
 
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
-	@echo "make lips        better lips for VIDEO=clip.mp4: files and a page (MODEL=generic or FILE.h5,"
+	@echo "make lips        better lips for VIDEO=clip.mp4 or photo.jpg: files and a page (MODEL=generic or FILE.h5,"
 	@echo "                 SCAN=neutral.obj, OUT=folder, FIRST= and LAST= frame)"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make generic     train the regressor of models/ on sixty synthetic people, or PEOPLE= (MODEL=generic)"

@@ -6,6 +6,7 @@ import pytest
 import yaml
 
 from vermilion.app.face_files import VARIABLE, face_model, face_model_before
+from vermilion.config.face_model import TITLES, FaceModelConfig
 from vermilion.faces.ict_archive import archive_contents
 from vermilion.faces.ict_cache import CONTENT_SHA256, cached_archive, content_sha256, fetch
 from vermilion.storage.errors import InputError, VermilionError
@@ -74,6 +75,13 @@ def test_without_any_of_them_a_sentence_and_the_embedded_model(offline):
     assert found.section == {"name": "procedural"}
     assert "no answer" in found.said and f"export {VARIABLE}=" in found.said
     assert "embedded (ICT-FaceKit was not found" in found.name
+
+
+def test_a_face_model_has_one_name_for_people(offline, monkeypatch):
+    monkeypatch.setitem(TITLES, "procedural", "home-made")
+    names = [face_model(offline).name, face_model({VARIABLE: "procedural"}).name]
+    assert all(name.startswith("home-made (") for name in [*names, FaceModelConfig().title])
+    assert "home-made" in face_model(offline).said
 
 
 def test_a_result_keeps_the_face_model_that_it_was_made_with(offline, tmp_path):

@@ -10,6 +10,7 @@ from scipy import sparse
 from tests import lip_patch
 from vermilion.baselines.null import null_model
 from vermilion.config.correction import CorrectionConfig
+from vermilion.config.evaluation import SurfaceConfig
 from vermilion.correction.coarse_take import CoarseTake, frames_around
 from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
 from vermilion.correction.correct import (
@@ -17,12 +18,13 @@ from vermilion.correction.correct import (
     correct,
     correct_with_layers,
 )
+from vermilion.correction.folds import LipFolds
 from vermilion.correction.image_agreement import ImageAgreement, ImageAgreementSettings
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, smoothed_motion
-from vermilion.correction.surface_quality import LipSurface
+from vermilion.correction.surface_quality import LipSurface, SurfaceTolerances
 from vermilion.features.rings import lip_rings
 from vermilion.geometry.cotangents import bending_stiffness
 from vermilion.geometry.mesh import unique_edges
@@ -51,6 +53,14 @@ def face():
 FACE = face()
 #: The mask of the layers: all but the outer rows.
 MASK = np.flatnonzero((FACE.triangles < 22 * lip_patch.COLUMNS).all(axis=1))
+
+
+def lip_surface(**changed):
+    """What measures the lips of the patch, by the configuration's tolerances but for those given."""
+    asked = DEFAULTS.__dict__ | SurfaceConfig().model_dump() | changed
+    folds = LipFolds(FACE, asked["folded_deg"], asked["crease_deg"])
+    tolerances = SurfaceTolerances(**{name: asked[name] for name in SurfaceConfig.model_fields})
+    return LipSurface(FACE, folds, tolerances)
 
 
 def integrator():
@@ -158,7 +168,7 @@ def test_noise_of_the_found_contours_leaves_no_ragged_edge():
     image = replace(image, inner_px=image.inner_px + noise, outer_px=image.outer_px - noise)
     on = replace(DEFAULTS, repose=False)
     ragged = [
-        LipSurface(FACE).measure(fitted(before, image, settings), before, CAMERA)
+        lip_surface().measure(fitted(before, image, settings), before, CAMERA)
         for settings in (on, replace(on, bending_mm=0.0))
     ]
     assert ragged[0].roughness_mm.mean() < 0.5 * ragged[1].roughness_mm.mean()

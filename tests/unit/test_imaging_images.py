@@ -12,7 +12,6 @@ from vermilion.capture.manifest import capture_manifest
 from vermilion.config.capture import CaptureConfig
 from vermilion.imaging.frames import open_frames
 from vermilion.imaging.images import (
-    IMAGE_SUFFIXES,
     ImageReading,
     image_size,
     linear_to_srgb,
@@ -21,6 +20,7 @@ from vermilion.imaging.images import (
     write_image,
     write_srgb8,
 )
+from vermilion.imaging.source import IMAGE_SUFFIXES, folder_of
 from vermilion.storage.errors import InputError, RefusedInputError
 
 IMAGE = scene(3)
@@ -200,6 +200,25 @@ def test_film_values_without_their_space_are_refused(tmp_path):
     with pytest.raises(RefusedInputError, match=r"a\.dpx.*printing density.*capture\.colour_space"):
         read_image(path)
     assert read_image(path, ImageReading(colour_space="ADX10")).shape == LINEAR.shape
+
+
+@pytest.mark.parametrize("tag", [1, 6])
+def test_a_photograph_is_a_take_of_one_frame_as_a_folder_with_it_is(tmp_path, tag):
+    (tmp_path / "folder").mkdir()
+    numbered = write(tmp_path / "folder" / "000000.jpg", STORED[tag](IMAGE), Orientation=tag)
+    photo = tmp_path / "portrait.JPG"
+    photo.write_bytes(numbered.read_bytes())
+    alone, folder = open_frames(photo), open_frames(numbered.parent)
+    assert np.array_equal(alone.read("cam", 0), folder.read("cam", 0))
+    assert alone.size("cam") == folder.size("cam") == IMAGE.shape[1::-1]
+    with pytest.raises(InputError, match="no image of this frame"):
+        alone.read("cam", 1)
+    manifest = capture_manifest(photo, "s", "t", [0])
+    assert not manifest.bad and manifest.frames["cam"][0]["file"] == photo.name
+    size = manifest.cameras["cam"]["width_px"], manifest.cameras["cam"]["height_px"]
+    assert size == IMAGE.shape[1::-1]
+    assert folder_of(photo, "labels") == tmp_path / "portrait.JPG.labels"
+    assert folder_of(numbered.parent, "labels") == numbered.parent / "labels"
 
 
 def test_a_capture_of_mixed_orientation_has_one_size(tmp_path):

@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from vermilion.app.run_progress import RunProgress
 from vermilion.app.workflow import ProgressLine, run_workflow
 from vermilion.storage.logfile import FAILED_SUFFIX
@@ -77,6 +79,47 @@ def test_what_fails_before_any_job_is_said(tmp_path):
     terminal = io.StringIO()
     run_workflow(words, tmp_path / "s.log", stream=terminal)
     assert "2 problem(s)" in terminal.getvalue()
+
+
+PROBLEMS = [
+    "2 problem(s) in the configuration:",
+    "  1. mine.yaml, key a: x",
+    "  2. mine.yaml, key b: y",
+]
+WHERE = 'in file "/v/workflow/rules/common.smk", line 56'
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        [f"WorkflowError {WHERE}:", *PROBLEMS, '  File "/v/workflow/rules/common.smk", line 5, in x'],
+        [
+            f"InputFunctionException in rule a {WHERE}:", "Error:", "  WorkflowError:",
+            *(f"    {line}" for line in PROBLEMS),
+            "Wildcards:", "  take=a", "Traceback:", '  File "/v/workflow/rules/common.smk", line 5, in x',
+        ],
+    ],
+)  # fmt: skip
+def test_what_a_rule_file_says_is_said_without_where_it_stands(tmp_path, said):
+    words = [sys.executable, "-c", f"print({chr(10).join(said)!r}); raise SystemExit(1)"]
+    terminal = io.StringIO()
+    run_workflow(words, tmp_path / "s.log", stream=terminal)
+    shown = terminal.getvalue().strip().splitlines()
+    assert shown[-4:] == [*PROBLEMS, f"Log: {tmp_path / 's.log'}"]
+    assert not any(
+        part in terminal.getvalue() for part in ("Traceback", "Wildcards", "WorkflowError")
+    )
+
+
+def test_an_error_in_a_rule_file_itself_is_told_with_its_place(tmp_path):
+    said = [
+        f"InputFunctionException {WHERE}:", "Error:", "  KeyError: 'x'", "Wildcards:", "Traceback:",
+        '  File "/v/workflow/rules/common.smk", line 5, in x',
+    ]  # fmt: skip
+    words = [sys.executable, "-c", f"print({chr(10).join(said)!r}); raise SystemExit(1)"]
+    terminal = io.StringIO()
+    run_workflow(words, tmp_path / "s.log", stream=terminal)
+    assert chr(10).join(said) in terminal.getvalue()
 
 
 def test_without_a_terminal_a_line_a_stage():

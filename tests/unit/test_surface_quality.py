@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
-from vermilion.correction.surface_quality import SEEN_MM, LipSurface, parabola_residuals
+from vermilion.config.evaluation import SurfaceConfig
+from vermilion.correction.surface_quality import parabola_residuals
 from vermilion.geometry.mesh import adjacency
 
-from .test_image_contours import CAMERA, FACE
+from .test_image_contours import CAMERA, FACE, lip_surface
 
 
 @pytest.fixture(scope="module")
 def lips():
-    return LipSurface(FACE)
+    return lip_surface()
 
 
 def quality(lips, mesh, base=None):
@@ -37,13 +38,35 @@ def middle(mesh, region):
     return ids[np.argmax(mesh[ids] @ np.array([0.0, 0.0, 1.0]) - np.abs(mesh[ids, 0]))]
 
 
-def test_a_vertex_drawn_over_its_neighbours_folds_triangles(lips):
+def folded_mesh():
+    """A mesh of which one vertex is drawn over its neighbours."""
     mesh = lip_patch.vertices_at(1.8, 0.0)
     vertex = middle(mesh, FACE.regions["vermilion_upper"])
     near = adjacency(FACE.triangles, FACE.n_vertices)[[vertex]].indices
     over = mesh.copy()
     neighbour = near[np.argmax(np.abs(mesh[near, 0] - mesh[vertex, 0]))]
     over[vertex] += 3.0 * (mesh[neighbour] - mesh[vertex])
+    return over
+
+
+def mesh_with_inner_mouth():
+    """A mesh whose innermost rows lie in front of the lower lip."""
+    mesh = lip_patch.vertices_at(1.8, 0.0)
+    row = np.arange(FACE.n_vertices) // lip_patch.COLUMNS  # the first are the innermost
+    lower = (row < lip_patch.INNER_ROWS) & (mesh[:, 1] < 0)
+    mesh[lower] += (lip_patch.INNER_ROWS - row[lower])[:, None] * np.array([0.0, -2.0, 4.0])
+    return mesh
+
+
+def mesh_with_teeth(height_mm):
+    """A mesh whose inner edges have teeth of a height."""
+    mesh = lip_patch.vertices_at(1.8, 0.0)
+    mesh[:, 1] += height_mm * np.cos(2.5 * lip_patch.vertices_at(1.8, 0.0)[:, 0])
+    return mesh
+
+
+def test_a_vertex_drawn_over_its_neighbours_folds_triangles(lips):
+    over = folded_mesh()
     found = quality(lips, over)
     assert found.folded[0] >= 2
     assert "flipped or folded" in found.reasons()[0]
@@ -51,21 +74,31 @@ def test_a_vertex_drawn_over_its_neighbours_folds_triangles(lips):
 
 
 def test_inner_mouth_drawn_before_the_lip_is_seen(lips):
-    mesh = lip_patch.vertices_at(1.8, 0.0)
-    before = mesh.copy()
-    row = np.arange(FACE.n_vertices) // lip_patch.COLUMNS  # the first are the innermost
-    lower = (row < lip_patch.INNER_ROWS) & (mesh[:, 1] < 0)
-    before[lower] += (lip_patch.INNER_ROWS - row[lower])[:, None] * np.array([0.0, -2.0, 4.0])
-    found = quality(lips, before)
+    found = quality(lips, mesh_with_inner_mouth())
     assert found.inner_mouth[0] and found.hidden_share[0] > 0.05
     assert "inner mouth in front of" in found.reasons()[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "mesh", "reason"),
+    [
+        ("folded_deg", 179.9, folded_mesh(), "folded"),
+        ("crease_deg", 0.001, folded_mesh(), "folded"),
+        ("inner_mouth_mm", 9.9, mesh_with_inner_mouth(), "inner mouth"),
+        ("inner_mouth_share", 0.9, mesh_with_inner_mouth(), "inner mouth"),
+        ("rough_ratio", 99.0, mesh_with_teeth(0.3), "rough"),
+        ("rough_mm", 9.0, mesh_with_teeth(0.3), "rough"),
+    ],
+)
+def test_what_counts_as_wrong_is_what_the_configuration_says(lips, key, value, mesh, reason):
+    assert reason in quality(lips, mesh).reasons()[0]
+    assert reason not in quality(lip_surface(**{key: value}), mesh).reasons()[0]
 
 
 def test_teeth_in_the_inner_edge_are_rough_and_another_opening_is_not(lips):
     base = lip_patch.vertices_at(1.8, 0.0)
     side = np.sign(base[:, 1])
-    teeth = base.copy()
-    teeth[:, 1] += 0.3 * np.cos(2.5 * base[:, 0])
+    teeth = mesh_with_teeth(0.3)
     assert quality(lips, teeth, base).roughness_ratio[0] > 3
     assert "times as rough" in quality(lips, teeth, base).reasons()[0]
     wider = base.copy()
@@ -86,13 +119,11 @@ def test_the_inside_of_a_corner_that_the_upper_lip_hides_is_no_edge(lips):
 
 def test_an_edge_that_nobody_sees_to_be_rough_is_not_told(lips):
     base = lip_patch.vertices_at(1.8, 0.0)
-    fine, seen = base.copy(), base.copy()
-    fine[:, 1] += 0.06 * np.cos(2.5 * base[:, 0])
-    seen[:, 1] += 0.3 * np.cos(2.5 * base[:, 0])
+    fine, seen = mesh_with_teeth(0.06), mesh_with_teeth(0.3)
     assert quality(lips, fine, base).roughness_ratio[0] > 1.3
     assert (
         quality(lips, fine, base).roughness_mm[0]
-        < SEEN_MM
+        < SurfaceConfig().rough_mm
         < quality(lips, seen, base).roughness_mm[0]
     )
     assert quality(lips, fine, base).reasons() == [""]

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from tests import lip_patch
-from vermilion.correction.surface_quality import LipSurface
+from vermilion.correction.folds import LipFolds
 from vermilion.correction.unfold import Unfolder
 from vermilion.geometry.mesh import adjacency
 
-from .test_image_contours import FACE
-from .test_surface_quality import middle
+from .test_image_contours import DEFAULTS, FACE
+from .test_surface_quality import folded_mesh, middle
 
-LIPS = LipSurface(FACE)
-UNFOLDER = Unfolder(LIPS, FACE.triangles, FACE.neutral_mm)
+FOLDS = LipFolds(FACE, DEFAULTS.folded_deg, DEFAULTS.crease_deg)
+UNFOLDER = Unfolder(FOLDS, FACE.triangles, FACE.neutral_mm)
 
 
 def folded(mesh, base):
-    return len(LIPS.folded_triangles(mesh, base))
+    return len(FOLDS.folded_triangles(mesh, base))
 
 
 def test_a_mesh_without_folds_stays_as_it_is():
@@ -41,6 +41,13 @@ def test_a_fold_goes_and_the_rest_of_the_mouth_stays(base):
     assert np.linalg.norm(mended - sound, axis=1).max() < tolerance_mm
     touched = np.linalg.norm(mended - torn, axis=1) > 0
     assert touched.sum() < 0.05 * FACE.n_vertices
+
+
+def test_what_counts_as_a_fold_is_what_the_correction_is_told():
+    base, torn = lip_patch.vertices_at(0.6, 0.0), folded_mesh()
+    folds = LipFolds(FACE, 179.9, DEFAULTS.crease_deg)
+    assert folded(torn, base) and len(folds.folded_triangles(torn, base)) == 0
+    assert Unfolder(folds, FACE.triangles, FACE.neutral_mm).unfold(torn, base) is torn
 
 
 def test_a_layer_that_turns_one_lip_over_is_mended_though_the_base_is_elsewhere():

@@ -1,10 +1,12 @@
 """The graph of jobs: truth stays in the evaluation, and parameters hold what a rule reads."""
 
+import io
 import json
 import re
 
 import pytest
 
+from vermilion.app.workflow import run_workflow
 from vermilion.provenance.fingerprint import imported_files
 
 from .conftest import ROOT, Project
@@ -140,6 +142,19 @@ def test_a_script_is_run_by_one_rule_with_its_own_fingerprint(path):
     )
 
 
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.stem)
+def test_a_key_that_a_script_reads_is_listed_by_its_rule(path):
+    read = set(re.findall(r'cfg\["([a-z_]+\.[a-z_.]+)"\]', path.read_text()))
+    files = "".join(rules.read_text() for rules in RULES)
+    for body in re.split(r"^ *rule ", files, flags=re.MULTILINE)[1:]:
+        if f"/{path.parent.name}/{path.name}" not in body or "cfg=cfg_of(" not in body:
+            continue
+        for shared in re.findall(r"\*([A-Z_]+)", body):  # keys of several rules: a tuple
+            body += re.search(rf"^{shared} = .*(?:\n    .*|\n[)\]])*", files, re.MULTILINE)[0]
+        listed = set(re.findall(r'"([a-z_.]+)"', body))  # or only the last part, below one section
+        assert {key for key in read if not listed & {key, key.rpartition(".")[2]}} == set()
+
+
 @pytest.mark.slow
 def test_wrong_configuration_stops_before_any_job(fresh_project):
     run = fresh_project.snakemake("--config", "chunk_frames=none", "results=", check=False)
@@ -148,3 +163,19 @@ def test_wrong_configuration_stops_before_any_job(fresh_project):
     assert "2 problem(s) in the configuration" in printed
     assert "key chunk_frames: found" in printed and "key results: found" in printed
     assert "Job stats" not in printed
+
+
+@pytest.mark.slow
+def test_a_detector_that_nothing_trains_is_one_sentence_where_landmarks_are_needed(
+    fresh_project, tmp_path, monkeypatch
+):
+    without = ("--config", "landmarks={training_takes: []}")
+    assert "captures" in fresh_project.would_run("captures", *without)
+    monkeypatch.chdir(fresh_project.folder)
+    monkeypatch.setenv("PYTHONPATH", fresh_project.environment()["PYTHONPATH"])
+    terminal = io.StringIO()
+    assert run_workflow(fresh_project.command(*without), tmp_path / "s.log", stream=terminal) == 1
+    told = terminal.getvalue().partition("\n\n")[2].strip().splitlines()
+    assert "config/tiny.yaml, key landmarks.training_takes: found none; expected" in told[0]
+    assert told[0].endswith("`mediapipe` is for real faces.")
+    assert told[1:] == [f"Log: {tmp_path / 's.log'}"]

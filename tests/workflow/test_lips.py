@@ -4,11 +4,15 @@ import json
 import os
 import sys
 
+import h5py
 import numpy as np
 import pytest
 
 from vermilion.app.lip_shot import LipShot, write_shot
+from vermilion.faces.build import TRACKER_TOPOLOGIES
+from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
+from vermilion.regression.model import FORMAT, FORMAT_VERSION
 
 from .conftest import Project
 
@@ -19,14 +23,21 @@ TRACK = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def shot(fresh_project, tmp_path):
-    """A project whose configuration is that of a clip with a space and an umlaut in its path."""
+def write_clip(path):
+    write_video(path, [np.full((64, 48, 3), 90, np.uint8)] * 12, 25.0)
+
+
+def write_photo(path):
+    write_srgb8(path, np.full((64, 48, 3), 90, np.uint8))
+
+
+def lips_of(fresh_project, tmp_path, name, write):
+    """A project whose configuration is that of a file, and options of Snakemake."""
     environment = tmp_path / "landmarks" / "bin"
     environment.mkdir(parents=True)
     (environment / "python").symlink_to(sys.executable)  # a dry run does not start it
-    clip = tmp_path / "Größe 1.mp4"
-    write_video(clip, [np.full((64, 48, 3), 90, np.uint8)] * 12, 25.0)
+    clip = tmp_path / name
+    write(clip)
     results = tmp_path / "out put"
     write_shot(LipShot(clip, str(results), {"name": "procedural"}))
     project = Project(fresh_project.folder, str(results / "config.yaml"))
@@ -36,10 +47,22 @@ def shot(fresh_project, tmp_path):
     return project, ("--config", f"landmarks={place}")
 
 
+@pytest.fixture
+def shot(fresh_project, tmp_path):
+    """That of a clip with a space and an umlaut in its path."""
+    return lips_of(fresh_project, tmp_path, "Größe 1.mp4", write_clip)
+
+
 @pytest.mark.slow
 def test_contours_alone_run_nothing_that_learns_or_measures(shot):
     project, options = shot
     assert set(project.would_run(*options)) == TRACK
+
+
+@pytest.mark.slow
+def test_a_photograph_takes_the_path_of_a_video(fresh_project, tmp_path):
+    project, options = lips_of(fresh_project, tmp_path, "Größe 1.jpg", write_photo)
+    assert set(project.would_run(*options)) == TRACK - {"video_facts"}
 
 
 @pytest.mark.slow
@@ -51,6 +74,12 @@ def test_a_model_of_another_run_is_an_input_and_nothing_is_trained(shot, tmp_pat
     run = project.snakemake("--dry-run", *options, f"apply={apply}")
     assert f", {model}" in run.stdout + run.stderr
     assert "rule train" not in run.stdout + run.stderr
+    with h5py.File(model, "w") as file:
+        topology = TRACKER_TOPOLOGIES["ict"]
+        file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, topology_sha256=topology)
+    other = project.snakemake("--dry-run", *options, f"apply={apply}", check=False)
+    told = f"key apply.model: found {model}, which was trained for the face model ICT-FaceKit"
+    assert other.returncode and told in other.stdout + other.stderr
     os.unlink(model)
     missing = project.snakemake("--dry-run", *options, f"apply={apply}", check=False)
     assert missing.returncode and str(model) in missing.stdout + missing.stderr

@@ -69,6 +69,15 @@ def test_ridge_parameter(finished):
         assert set(finished.would_run()) == AFTER_TRAINING | {"train"}
 
 
+def test_when_an_edge_of_the_lips_counts_as_rough(finished):
+    def change(content):
+        measures = content.setdefault("evaluation", {}).setdefault("measures", {})
+        measures["surface"] = {"rough_ratio": 2.0}
+
+    with configured(finished, change):
+        assert set(finished.would_run()) == AFTER_TRAINING | {"evaluate_reconstruction"}
+
+
 def test_neutral_frame_of_a_video(finished):
     def change(content):
         content["correction"] = {"neutral_frames": {"s1/phone": 1}}

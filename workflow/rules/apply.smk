@@ -1,7 +1,35 @@
 """Better lips for a video (Lips16 6): apply/<subject>/<take>/ with meshes, weights, USD, overlay."""
 
+from vermilion.config.face_model import TITLES
+from vermilion.faces.build import face_model_of
+from vermilion.storage.errors import ModelFileError
+
 #: File of a regressor that was trained elsewhere; None where there is none.
 GIVEN_MODEL = CONFIG.apply.file(CONFIG.face_model.name)
+
+
+def refuse_other_face_models():
+    """End the run where a regressor's file was trained for another face model; damage is its job's to name."""
+    given = {"apply.model": GIVEN_MODEL, "evaluation.generic": CONFIG.evaluation.generic}
+    for key, file in given.items():
+        if not file:
+            continue
+        from vermilion.regression.model import model_topology
+
+        try:
+            trained_for = face_model_of(model_topology(file))
+        except ModelFileError:
+            continue
+        if trained_for not in (None, CONFIG.face_model.name):
+            raise WorkflowError(
+                f"{ORIGIN}, key {key}: found {file}, which was trained for the face model {TITLES[trained_for]}; "
+                f"expected one for that of this run, {CONFIG.face_model.title}. Name another file, or set "
+                "face_model."
+            )
+
+
+if IS_MAIN_PROCESS and not EXTERNAL:  # another tracker's triangles are its own
+    refuse_other_face_models()
 
 
 def apply_regressor(wildcards):
@@ -150,7 +178,13 @@ rule apply:
         mem_mb=growing(1500),
         runtime=growing(60),
     params:
-        cfg=cfg_of("apply.overlay", "correction.integration", "correction.image", *MASK_KEYS),
+        cfg=cfg_of(
+            "apply.overlay",
+            "correction.integration",
+            "correction.image",
+            "evaluation.measures.surface",
+            *MASK_KEYS,
+        ),
         code=code_of("apply/apply"),
         frames=chunk_frames,
         fps=take_fps,

@@ -3,14 +3,13 @@
 from functools import cache
 
 from vermilion.imaging.frames import list_frames
-from vermilion.imaging.images import IMAGE_SUFFIXES
 from vermilion.capture.camera_files.read import camera_files as given_camera_files
-from vermilion.imaging.source import folder_of, is_video
+from vermilion.imaging.source import IMAGE_SUFFIXES, folder_of, is_video
 
 
 @cache
 def capture_files(source):
-    """Frame -> images of that frame, of a capture folder or a folder of frames."""
+    """Frame -> images of that frame, of a capture folder, a folder of frames, or a single image."""
     rig = Path(source) / "frames"
     folders = sorted(rig.glob("*/")) if rig.is_dir() else [Path(source)]
     files = {}

@@ -70,11 +70,11 @@ def landmark_file_input(wildcards):
 def training_takes():
     """Rows of the takes with labelled landmarks."""
     wanted = CONFIG.landmarks.training_takes
-    missing = sorted(set(wanted) - {take.name for take in TAKES})
-    if missing or not wanted:
+    if not wanted:
         raise WorkflowError(
-            f"landmarks.training_takes: found {missing or 'none'}, expected names of takes as "
-            f"subject/take that are in {CONFIG.takes}. Name them, or set landmarks.detector."
+            f"{ORIGIN}, key landmarks.training_takes: found none; expected takes with clicked landmarks, "
+            f"written subject/take, as landmarks.detector is `trained`. Name some of {CONFIG.takes}, or set "
+            "landmarks.detector: `mediapipe` is for real faces."
         )
     return [take for take in TAKES if take.name in wanted]
 

@@ -15,7 +15,7 @@ from vermilion.geometry.camera import Camera
 from vermilion.imaging.draw import draw_points, label, resized_to_height, tile, to_display
 from vermilion.imaging.frames import list_frames, open_frames, read_or_none
 from vermilion.imaging.images import image_size, write_srgb8
-from vermilion.imaging.source import folder_of, is_video
+from vermilion.imaging.source import folder_of, is_single_file
 from vermilion.storage.errors import InputError, VermilionError
 
 _AXES_MM = 100.0
@@ -105,7 +105,7 @@ def report(configuration: str | Path, wanted: str | None = None) -> int:
         if wanted not in (None, take.name):
             continue
         folder = folder_of(take.source, "cameras")
-        if is_video(take.source) or not folder.is_dir():
+        if is_single_file(take.source) or not folder.is_dir():
             print(
                 f"{take.name}: no cameras/ beside its images; calibrated from a board, or assumed"
             )

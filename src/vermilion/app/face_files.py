@@ -10,11 +10,12 @@ from pathlib import Path
 
 import yaml
 
+from vermilion.config.face_model import ICT_VARIABLE, TITLES
 from vermilion.faces.ict_cache import LICENCE, cached_archive, fetch
 from vermilion.storage.errors import InputError, VermilionError
 
 #: Folder or archive of ICT-FaceKit; `procedural` asks for the embedded model.
-VARIABLE = "VERMILION_ICT_FACEKIT"
+VARIABLE = ICT_VARIABLE
 EMBEDDED = "procedural"
 ICT = "ict"
 REMEDY = (
@@ -61,7 +62,7 @@ def face_model(
     """
     named = environment.get(VARIABLE, "")
     if named == EMBEDDED:
-        asked = f"embedded ({VARIABLE}={EMBEDDED})"
+        asked = f"{TITLES[EMBEDDED]} ({VARIABLE}={EMBEDDED})"
         return ModelChoice({"name": EMBEDDED}, asked, f"Face model: {asked}.")
     if named:
         path = Path(named).expanduser().resolve()
@@ -92,9 +93,9 @@ def face_model(
             ) from error
         return ModelChoice(
             {"name": EMBEDDED},
-            f"embedded (ICT-FaceKit was not found; see {VARIABLE} in README)",
-            f"Face model: embedded, which knows fewer people than ICT-FaceKit: {_brief(error)}. "
-            f"For ICT-FaceKit: {REMEDY}.",
+            f"{TITLES[EMBEDDED]} ({TITLES[ICT]} was not found; see {VARIABLE} in README)",
+            f"Face model: {TITLES[EMBEDDED]}, which knows fewer people than {TITLES[ICT]}: {_brief(error)}. "
+            f"For {TITLES[ICT]}: {REMEDY}.",
         )
     return _ict(path.resolve(), f"{path}; {LICENCE}")
 
@@ -110,7 +111,7 @@ def face_model_before(configuration: Path) -> dict[str, str] | None:
 
 def _ict(path: Path, whence: str) -> ModelChoice:
     section = {"name": ICT, "path": str(path)}
-    return ModelChoice(section, "ICT-FaceKit", f"Face model: ICT-FaceKit ({whence}).")
+    return ModelChoice(section, TITLES[ICT], f"Face model: {TITLES[ICT]} ({whence}).")
 
 
 def _brief(error: Exception) -> str:

@@ -8,7 +8,7 @@ from vermilion.config.studio import StudioConfig
 from vermilion.config.takes import STUDIO, Take
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.images import AS_TAGGED, ImageReading, image_size
-from vermilion.imaging.source import is_video
+from vermilion.imaging.source import is_image, is_video
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import VermilionError
 from vermilion.studio.rig import FACE_ANGLES_DEG, LIP_ANGLES_DEG, VIDEO_CAMERAS, camera_names
@@ -44,8 +44,8 @@ def _studio_sizes(role: str, studio: StudioConfig) -> list[tuple[int, int]]:
 
 
 def _sizes(source: Path, reading: ImageReading) -> list[tuple[int, int]]:
-    """(width, height) of each camera of a capture folder, a frame folder or a video."""
-    if source.is_file():
+    """(width, height) of each camera of a capture folder, a frame folder, a video or an image."""
+    if source.is_file() and not is_image(source):
         return [VideoReader(source).size] if is_video(source) else []
     folders = sorted(p for p in (source / "frames").glob("*") if p.is_dir()) or [source]
     firsts = [next(iter(list_frames(folder).values()), None) for folder in folders]

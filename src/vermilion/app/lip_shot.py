@@ -12,8 +12,8 @@ import yaml
 
 from vermilion.config.frame_range import frame_range
 from vermilion.imaging.frames import list_frames
-from vermilion.imaging.images import IMAGE_SUFFIXES
-from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
+from vermilion.imaging.images import image_size
+from vermilion.imaging.source import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_single_file, is_video
 from vermilion.imaging.video import VideoReader
 from vermilion.storage.errors import InputError
 from vermilion.storage.files import write_text
@@ -21,8 +21,8 @@ from vermilion.storage.files import write_text
 SUBJECT = "face"
 #: Frames of a job: fewer keep all cores busy, but a job needs about two seconds to start.
 LEAST_CHUNK, MOST_CHUNK = 50, 300
-#: Rate of a folder of images, which does not tell one.
-FOLDER_FPS = 25.0
+#: Rate of images, which do not tell one.
+IMAGES_FPS = 25.0
 #: Two dots over a letter, as a character of its own.
 _DIAERESIS = "\u0308"
 
@@ -32,7 +32,7 @@ class LipShot:
     """What a user asks for.
 
     Attributes:
-        video: a video file, or a folder of numbered images.
+        video: a video file, a single image, or a folder of numbered images.
         results: folder of all results.
         face_model: lines of the section `face_model`, as a mapping.
         model: file of a trained regressor; None: contours alone.
@@ -86,10 +86,10 @@ def write_shot(shot: LipShot, cores: int = 1) -> tuple[int, int]:
         (number of frames, frames of a job).
 
     Raises:
-        InputError: the source is no video and no folder of images, or has no frames.
+        InputError: the source is no video, image or folder of images, or has no frames.
     """
     first, last = frames_of_shot(shot)
-    fps = VideoReader(shot.video).fps if is_video(shot.video) else FOLDER_FPS
+    fps = VideoReader(shot.video).fps if is_video(shot.video) else IMAGES_FPS
     if "\t" in str(shot.video) or "\n" in str(shot.video):
         raise InputError("a tab in the path", "a path without tabs", "Rename it.", path=shot.video)
     sheet = Path(shot.results) / "takes.tsv"
@@ -115,15 +115,18 @@ def frames_of_shot(shot: LipShot) -> tuple[int, int]:
     """First and last frame that the user asks for.
 
     Raises:
-        InputError: the source is no video and no folder of images that can be read, or has not these frames.
+        InputError: the source is no video, image or folder of images that can be read, or has not these frames.
     """
-    if shot.video.is_file() and not is_video(shot.video):
+    if shot.video.is_file() and not is_single_file(shot.video):
         raise InputError(
-            "a file that is no video",
-            f"a video ({', '.join(VIDEO_SUFFIXES)}) or a folder of numbered images",
-            "Correct VIDEO, or convert it, for example to H.264 in MP4.",
+            "a file that is no video and no image",
+            f"a video ({', '.join(VIDEO_SUFFIXES)}), an image ({', '.join(sorted(IMAGE_SUFFIXES))}) or a folder of "
+            "numbered images",
+            "Correct VIDEO, or convert it, for example to H.264 in MP4 or to JPEG.",
             path=shot.video,
         )
+    if shot.video.is_file() and not is_video(shot.video):
+        image_size(shot.video)  # one that cannot be read stops here
     is_capture = (shot.video / "frames").is_dir()
     if shot.video.is_dir() and not is_capture and not list_frames(shot.video):
         raise InputError(

@@ -16,6 +16,7 @@ from vermilion.app.face_files import (
     face_model,
     face_model_before,
 )
+from vermilion.app.lip_regressor import check_regressor
 from vermilion.app.lip_shot import LipShot, frames_of_shot, write_shot
 from vermilion.app.lips_ending import ending
 from vermilion.app.run import run_all
@@ -66,7 +67,7 @@ def correct_lips(
     """
     if not video:
         raise VermilionError(
-            "Name a video: make lips VIDEO=clip.mp4 (or a folder of numbered images)."
+            "Name a video: make lips VIDEO=clip.mp4 (or an image, or a folder of numbered images)."
         )
     asked = (("model", None if model == GENERIC else model), ("scan", scan))
     given = {name: _file(name, path) for name, path in asked if path}
@@ -81,8 +82,11 @@ def correct_lips(
     print(face.said, file=sys.stderr)
     if model == GENERIC:
         shot = replace(shot, model=_generic(face))
+    if shot.model is not None:
+        check_regressor(shot.model, face)
     n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
-    print(f"{n_frames} frames of {source.name} -> {results}", file=sys.stderr)
+    frames = "1 frame" if n_frames == 1 else f"{n_frames} frames"
+    print(f"{frames} of {source.name} -> {results}", file=sys.stderr)
     takes, problems = read_takes(str(Path(results) / "takes.tsv"))
     if problems:
         raise InputError("; ".join(problems), "a take sheet", "Report this.")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -13,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import IO
 
@@ -28,6 +30,8 @@ _EVERY_S = 1.0
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 #: Lines of what Snakemake printed last, to say what failed before any job.
 _LAST_LINES = 1000
+#: How Snakemake begins to tell what a rule file raised.
+_RAISED = re.compile(r'(?:WorkflowError|InputFunctionException) in .*file ".*\.smk", line \d+:')
 #: Without a terminal, a line is printed where the stage changes, and this often.
 _PLAIN_EVERY_S = 20.0
 
@@ -189,8 +193,24 @@ def _failure(state: RunProgress, log: Path, printed: Sequence[str]) -> str:
     lines = "".join(printed).strip().splitlines()
     if any(os.strerror(number) in line for line in lines for number in _NO_ROOM):
         return f"\n{full_disk(Path('.snakemake').absolute())}\n"  # Snakemake's own files
+    said = _said_by_rules(lines)
+    if said:
+        return "\n".join(["", *said, f"Log: {log}", ""])
     starts = [n for n, line in enumerate(lines) if "Error" in line or "Exception" in line]
     return "\n".join(["", *lines[starts[0] if starts else -12 :][:60], f"Log: {log}", ""])
+
+
+def _said_by_rules(lines: Sequence[str]) -> list[str]:
+    """Lines of what a rule file says is wrong, without where in the file; empty: it says nothing."""
+    start = next((n for n, line in enumerate(lines) if _RAISED.fullmatch(line)), None)
+    if start is None:
+        return []
+    said = lines[start + 1 :]
+    if lines[start].startswith("Input"):
+        if list(said[:2]) != ["Error:", "  WorkflowError:"]:
+            return []  # an error in our code: all of it is needed
+        said = [line[4:] for line in takewhile(lambda line: line.startswith("    "), said[2:])]
+    return list(takewhile(lambda line: not line.startswith('  File "'), said))
 
 
 def _cores(words: Sequence[str]) -> int:

@@ -42,7 +42,7 @@ def check_image(
 
     Args:
         path: the file.
-        root: the capture; `ImageFacts.file` is relative to it.
+        root: the capture, or the image itself; `ImageFacts.file` is relative to it.
         expected_size: (width, height), None for any.
         reading: what the file does not say of itself.
 
@@ -66,7 +66,7 @@ def check_image(
     if pixels is None or failed:
         return None, f"truncated or damaged{': ' + message if message else ''}"
     facts = ImageFacts(
-        file=path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name,
+        file=path.relative_to(root).as_posix() if root in path.parents else path.name,
         size_bytes=path.stat().st_size,
         sha256=sha256_of(path),
         width_px=width,

@@ -30,7 +30,7 @@ class Manifest:
 
     Attributes:
         source: a path, or a path with how its images are read (see `imaging.source`).
-        kind: `capture` (folders of frames of named cameras), `frames` (one folder) or `video`.
+        kind: `capture` (folders of frames of named cameras), `frames` (one folder, or one image) or `video`.
         cameras: name -> {width_px, height_px, channels, bits}; the size the images should have.
         frames: camera -> frame -> facts of the file (empty for a video).
         bad: camera -> frame -> reason.
@@ -92,7 +92,7 @@ def capture_manifest(
     take goes on.
 
     Args:
-        source: capture folder, folder of frames, or video file.
+        source: capture folder, folder of frames, video file, or image.
         frames: frame numbers of the chunk.
         cameras: names to check; all of the rig by default.
         hash_decoded: also hash the decoded frames of a video.

@@ -15,8 +15,8 @@ from vermilion.capture.camera_files.read import read_given_cameras
 from vermilion.capture.manifest import Manifest
 from vermilion.geometry.camera import Camera, pinhole
 from vermilion.imaging.draw import to_display
-from vermilion.imaging.images import IMAGE_SUFFIXES, read_image
-from vermilion.imaging.source import Source, folder_of, is_video
+from vermilion.imaging.images import read_image
+from vermilion.imaging.source import IMAGE_SUFFIXES, Source, folder_of, is_single_file
 from vermilion.storage.errors import InputError, describe_problem
 from vermilion.storage.progress import progress
 
@@ -82,7 +82,7 @@ def rig_cameras(
     """Cameras of a take: read from `cameras/`, else calibrated from `calibration/`, else assumed.
 
     Args:
-        source: capture folder, frame folder or video.
+        source: capture folder, frame folder, video or image.
         sizes: camera -> (width, height) of its images.
         reference: camera whose frame becomes the world of a calibrated rig.
         board: the calibration board.
@@ -99,7 +99,7 @@ def rig_cameras(
         found = read_given_cameras(given, sizes)
         print(*found.understood, sep="\n")
         cameras = found.cameras
-        if is_video(source) and len(cameras) == len(sizes) == 1:  # a video's camera has no name
+        if is_single_file(source) and len(cameras) == len(sizes) == 1:  # its camera has no name
             name, (camera,) = next(iter(sizes)), cameras.values()
             cameras = {name: replace(camera, name=name)}
         _check_given(cameras, sizes, given, place)

@@ -10,7 +10,7 @@ from typing import Any
 from vermilion.config.root import Configuration
 from vermilion.config.sheet_cells import read_cells
 from vermilion.config.takes import STUDIO
-from vermilion.imaging.source import folder_of, is_video
+from vermilion.imaging.source import folder_of, is_single_file
 
 KEY = "capture.confined_to"
 _USD = (".usd", ".usda", ".usdc", ".usdz")
@@ -100,7 +100,7 @@ def _problems(path: str, folders: list[Path]) -> list[str]:
     real = _real(Path(path))
     if real is None or not _within(real, roots):
         return [f"found '{path}', which leads to '{real}'; expected a path in {shown}. {remedy}"]
-    beside = [folder_of(path, name) for name in _BESIDE] if is_video(path) else []
+    beside = [folder_of(path, name) for name in _BESIDE] if is_single_file(path) else []
     problems = []
     for found, reason in _leading_out([Path(path), *beside], roots):
         problems.append(

@@ -117,6 +117,20 @@ class ImageAgreementConfig(StageConfig):
         description="Lips that touch in the image touch in the mesh (by `contour_weight`), and lips never "
         "pass through each other.",
     )
+    folded_deg: float = Field(
+        120.0,
+        gt=0.0,
+        lt=180.0,
+        description="Two neighbouring triangles of one lip are folded where their normals are further apart "
+        "than this (degrees); folds are taken out, and `flipped_rate` and `quality.tsv` count those left.",
+    )
+    crease_deg: float = Field(
+        90.0,
+        gt=0.0,
+        lt=180.0,
+        description="They are not folded where the base track's normals are further apart than this "
+        "(degrees): a crease of its own.",
+    )
 
     @property
     def reach_frames(self) -> int:

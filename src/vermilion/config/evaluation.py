@@ -28,6 +28,39 @@ class ReferenceConfig(StageConfig):
     )
 
 
+class SurfaceConfig(StageConfig):
+    """From where on `quality.tsv` and the rates tell that something of the corrected lips' surface is wrong."""
+
+    inner_mouth_mm: float = Field(
+        0.2,
+        ge=0.0,
+        le=10.0,
+        description="The inside of the mouth counts where the camera sees it this far in front of the "
+        "vermilion (mm).",
+    )
+    inner_mouth_share: float = Field(
+        0.002,
+        ge=0.0,
+        le=1.0,
+        description="A frame has inner mouth in front where it hides more than this share of the vermilion "
+        "that faces the camera (0 to 1).",
+    )
+    rough_ratio: float = Field(
+        1.3,
+        gt=0.0,
+        le=100.0,
+        description="The inner edge of the lips is rough where its roughness is over this multiple of the base "
+        "track's (ratio).",
+    )
+    rough_mm: float = Field(
+        0.1,
+        ge=0.0,
+        le=10.0,
+        description="It is not rough where its roughness is at most this, which nobody sees: a quarter of a "
+        "pixel at a mouth of 120 px (mm).",
+    )
+
+
 class MeasuresConfig(StageConfig):
     """Figures and their confidence intervals."""
 
@@ -67,6 +100,9 @@ class MeasuresConfig(StageConfig):
         ge=0.0,
         le=10.0,
         description="Lips pass through each other where one lies deeper than this in the other (mm).",
+    )
+    surface: SurfaceConfig = section(
+        SurfaceConfig, "From where on something of the corrected lips' surface is wrong."
     )
     seed: int = Field(0, ge=0, description="Seed of the bootstrap.")
 

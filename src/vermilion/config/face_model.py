@@ -9,6 +9,10 @@ from pydantic import Field, model_validator
 from vermilion.config.base import StageConfig
 
 ICT_COMMIT = "da5f95a607f5e6b37755b38d3385d7f2853732e5"
+#: Variable of `vermilion lips`: folder or archive of ICT-FaceKit.
+ICT_VARIABLE = "VERMILION_ICT_FACEKIT"
+#: Face model -> its name for people.
+TITLES = {"procedural": "embedded", "ict": "ICT-FaceKit"}
 
 
 class FaceModelConfig(StageConfig):
@@ -75,8 +79,8 @@ class FaceModelConfig(StageConfig):
     def title(self) -> str:
         """The face model's name, for people."""
         if self.name == "ict":
-            return "ICT-FaceKit"
-        return "embedded (for ICT-FaceKit, see VERMILION_ICT_FACEKIT in README)"
+            return TITLES[self.name]
+        return f"{TITLES[self.name]} (for {TITLES['ict']}, see {ICT_VARIABLE} in README)"
 
     @model_validator(mode="after")
     def _download_needs_checksum(self) -> FaceModelConfig:

@@ -10,7 +10,7 @@ import numpy as np
 from vermilion.geometry.mesh_files import MESH_SUFFIXES
 from vermilion.imaging.frames import list_frames
 from vermilion.imaging.numbering import numbered_files
-from vermilion.imaging.source import is_video
+from vermilion.imaging.source import is_image, is_video
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.errors import InputError
 
@@ -31,7 +31,7 @@ def frame_range(source: str | Path, role: str) -> tuple[int, int]:
         )
     if role == "tracked":
         return _mesh_range(source)
-    if source.is_file():
+    if source.is_file() and not is_image(source):
         if not is_video(source):
             raise _silent(source)
         from vermilion.imaging.video import VideoReader

@@ -23,8 +23,8 @@ from vermilion.config.root import Configuration
 from vermilion.config.takes import STUDIO, Take, read_takes
 from vermilion.config.yaml_file import read_yaml
 from vermilion.imaging.frames import list_frames
-from vermilion.imaging.images import AS_TAGGED, IMAGE_SUFFIXES, ImageReading, refusal
-from vermilion.imaging.source import VIDEO_SUFFIXES, is_video
+from vermilion.imaging.images import AS_TAGGED, ImageReading, refusal
+from vermilion.imaging.source import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_image, is_video
 from vermilion.storage.errors import ConfigurationError, InputError, VermilionError
 
 
@@ -107,14 +107,14 @@ def check_source(take: Take, reading: ImageReading = AS_TAGGED) -> list[str]:
     wanted = f"frames {take.first} to {take.last}"
     if not source.exists():
         return [
-            f"source: found no '{source}'; expected a capture folder, a frame folder or a "
-            "video. Correct the path (relative to the folder where the workflow starts)."
+            f"source: found no '{source}'; expected a capture folder, a frame folder, a "
+            "video or an image. Correct the path (relative to the folder where the workflow starts)."
         ]
-    if source.is_file():
+    if source.is_file() and not is_image(source):
         if not is_video(source):
             return [
-                f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES)}. Convert "
-                f"it: `ffmpeg -i {source.name} -crf 12 {source.stem}.mp4`."
+                f"source: found '{source.name}'; expected one of {', '.join(VIDEO_SUFFIXES + IMAGE_SUFFIXES)}. Convert a video: "
+                f"`ffmpeg -i {source.name} -crf 12 {source.stem}.mp4`."
             ]
         from vermilion.imaging.video import VideoReader
 

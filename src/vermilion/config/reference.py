@@ -38,7 +38,7 @@ def take_sheet_schema() -> dict[str, Any]:
         "role": {"enum": list(ROLES), "description": "`plain`, `tattoo`, `video` or `tracked`."},
         "source": {
             "type": "string",
-            "description": "Capture folder, frame folder or video; `studio` for a synthetic one.",
+            "description": "Capture folder, frame folder, video or single image; `studio` for a synthetic one.",
         },
         "first": {
             **whole,

@@ -30,7 +30,7 @@ class Take:
     Attributes:
         subject, take: names, letters, digits, `_` and `.` only.
         role: `tattoo`, `plain`, `video` or `tracked`.
-        source: capture folder, frame folder or video file; `studio` for the embedded default.
+        source: capture folder, frame folder, video file or single image; `studio` for the embedded default.
         first, last: frame numbers, both included. The first frame shows the neutral. Left empty in the
             sheet, they are those of the source on disk.
         fps: frames a second.
@@ -188,7 +188,9 @@ def _word_problems(value: dict[str, str]) -> list[str]:
     if value["role"] not in get_args(Role):
         wrong.append(f"role: found '{value['role']}'; expected one of {', '.join(get_args(Role))}.")
     if not value["source"]:
-        wrong.append("source: found nothing; expected a capture folder, a video or `studio`.")
+        wrong.append(
+            "source: found nothing; expected a capture folder, a video, an image or `studio`."
+        )
     if not value["source"].isprintable():
         wrong.append(
             f"source: found {value['source']!r}; expected a path. Remove what cannot be seen."

@@ -12,6 +12,7 @@ import numpy as np
 
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
+from vermilion.correction.folds import LipFolds
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_constraints import (
@@ -22,7 +23,6 @@ from vermilion.correction.lip_constraints import (
 )
 from vermilion.correction.lip_crossings import LipCrossings
 from vermilion.correction.repose import ANCHORS, apply_motion, repose_motion, smoothed_motion
-from vermilion.correction.surface_quality import LipSurface
 from vermilion.correction.unfold import Unfolder
 from vermilion.faces.model import FaceModel
 from vermilion.features.contour_features import facing_interocular_px
@@ -53,6 +53,8 @@ class ImageAgreementSettings:
         contour_robust_mm: a contour point this far off counts half.
         closed_gap_iod: lips touch where the inner contour is lower than this, per inter-ocular distance.
         contact: whether lips that touch in the image meet, and never pass through each other.
+        folded_deg: of `LipFolds`: what counts as a fold of the lips, which is taken out.
+        crease_deg: of `LipFolds`: what is a crease of the base track.
     """
 
     repose: bool
@@ -62,6 +64,8 @@ class ImageAgreementSettings:
     contour_robust_mm: float
     closed_gap_iod: float
     contact: bool
+    folded_deg: float
+    crease_deg: float
 
     @property
     def used(self) -> bool:
@@ -94,7 +98,8 @@ class ImageAgreement:
         self._eyes = face.landmarks[EYE_CORNERS]
         self._pivot = neutral_mm.mean(axis=0)
         self._free = integrator.free
-        self._unfolder = Unfolder(LipSurface(face), face.triangles, neutral_mm)
+        folds = LipFolds(face, settings.folded_deg, settings.crease_deg)
+        self._unfolder = Unfolder(folds, face.triangles, neutral_mm)
         self._crossings = LipCrossings(face)
         self._occluding = OccludingContour.of(face, with_inside=False)
         lips = np.union1d(

@@ -7,10 +7,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
+from vermilion.correction.folds import LipFolds, triangles_of_one_lip
 from vermilion.faces.contours import LEFT_CORNER, RIGHT_CORNER
 from vermilion.faces.lips import lip_sides
 from vermilion.faces.model import FaceModel
@@ -18,23 +19,27 @@ from vermilion.geometry.camera import Camera
 from vermilion.geometry.mesh import normalised, triangle_areas, triangle_cross, unique_edges
 from vermilion.geometry.raycast import RayCaster
 
-#: Two triangles of one lip are folded whose normals are further apart than this (degrees), ...
-FOLDED_DEG = 120.0
-#: ... unless those of the base track are further apart than this: creases of the face model itself.
-CREASE_DEG = 90.0
-#: The inside of the mouth counts where it lies this far before the vermilion (mm), ...
-_BEFORE_MM = 0.2
-#: ... and where it hides more than this share of the vermilion that faces the camera.
-HIDDEN_SHARE = 0.002
 #: The inner edge in the image: its height in so many columns between these shares of the mouth's width.
 _COLUMNS, _FROM, _TO = 71, 0.15, 0.85
 #: Its roughness is what a parabola over so many columns to either side leaves of it.
 _REACH = 12
-#: The edge counts as rough from this multiple of the base track's, ...
-ROUGH = 1.3
-#: ... unless it is smoother than this (mm; a quarter of a pixel at a mouth of 120 px): nobody sees that, and of
-#: the track's 0.03 mm twice as much is nothing.
-SEEN_MM = 0.1
+
+
+@dataclass(frozen=True)
+class SurfaceTolerances:
+    """From where on something of the surface is wrong (`evaluation.measures.surface`).
+
+    Attributes:
+        inner_mouth_mm: the inside of the mouth counts where it lies this far before the vermilion, ...
+        inner_mouth_share: ... and where it hides more than this share of the vermilion that faces the camera.
+        rough_ratio: the inner edge is rough from this multiple of the base track's roughness, ...
+        rough_mm: ... unless it is smoother than this.
+    """
+
+    inner_mouth_mm: float
+    inner_mouth_share: float
+    rough_ratio: float
+    rough_mm: float
 
 
 @dataclass(frozen=True)
@@ -42,12 +47,14 @@ class SurfaceQuality:
     """Of some frames.
 
     Attributes:
+        tolerances: from where on it is wrong.
         folded: (F,) number of lip triangles that are flipped or folded.
         hidden_share: (F,) share of the vermilion that faces the camera and has inner mouth before it.
         roughness_mm: (F,) of the inner edge.
         base_roughness_mm: (F,) of the base track's.
     """
 
+    tolerances: SurfaceTolerances
     folded: np.ndarray
     hidden_share: np.ndarray
     roughness_mm: np.ndarray
@@ -61,7 +68,7 @@ class SurfaceQuality:
     @property
     def inner_mouth(self) -> np.ndarray:
         """(F,) bool: inner mouth is seen in front of the vermilion."""
-        return self.hidden_share > HIDDEN_SHARE
+        return self.hidden_share > self.tolerances.inner_mouth_share
 
     @property
     def roughness_ratio(self) -> np.ndarray:
@@ -71,22 +78,19 @@ class SurfaceQuality:
     @property
     def rough(self) -> np.ndarray:
         """(F,) bool: the inner edge is rougher than the base track's, as one sees."""
-        return (self.roughness_ratio > ROUGH) & (self.roughness_mm > SEEN_MM)
-
-    def __getitem__(self, rows: np.ndarray | slice) -> SurfaceQuality:
-        return SurfaceQuality(*(getattr(self, f.name)[rows] for f in fields(self)))
+        limits = self.tolerances
+        return (self.roughness_ratio > limits.rough_ratio) & (self.roughness_mm > limits.rough_mm)
 
     def reasons(self) -> list[str]:
         """What is wrong of each frame, F sentences; empty where nothing is."""
         found = []
-        for folded, hidden, rough, ratio in zip(
-            self.folded, self.hidden_share, self.rough, self.roughness_ratio, strict=True
-        ):
+        inner_mouth, rough, ratio = self.inner_mouth, self.rough, self.roughness_ratio
+        for f, folded in enumerate(self.folded):
             parts = [f"{folded} lip triangles flipped or folded"] if folded else []
-            if hidden > HIDDEN_SHARE:
-                parts.append(f"inner mouth in front of {hidden:.1%} of the vermilion")
-            if rough:
-                parts.append(f"inner edge {ratio:.1f} times as rough as the base track's")
+            if inner_mouth[f]:
+                parts.append(f"inner mouth in front of {self.hidden_share[f]:.1%} of the vermilion")
+            if rough[f]:
+                parts.append(f"inner edge {ratio[f]:.1f} times as rough as the base track's")
             found.append("; ".join(parts))
         return found
 
@@ -96,19 +100,18 @@ class LipSurface:
 
     Args:
         face: the model that the mesh is of.
+        folds: which finds those of that topology.
+        tolerances: from where on something is wrong.
     """
 
-    def __init__(self, face: FaceModel):
-        self._triangles = face.triangles
-        sides = lip_sides(face, with_inside=True)
-        corners = sides[face.triangles]
-        one_lip = (corners == corners[:, :1]).all(axis=1) & (corners[:, 0] != 0)
-        self._pairs = adjacent_triangles(face.triangles, np.flatnonzero(one_lip))
+    def __init__(self, face: FaceModel, folds: LipFolds, tolerances: SurfaceTolerances):
+        self._triangles, self._folds, self._tolerances = face.triangles, folds, tolerances
         red = face.regions["vermilion_upper"] | face.regions["vermilion_lower"]
         self._red = np.flatnonzero(red[face.triangles].all(axis=1))
         inside = face.regions["mouth_inner"] & ~red
         self._inside = inside[face.triangles].all(axis=1)
-        edges = unique_edges(face.triangles[one_lip])
+        sides = lip_sides(face, with_inside=True)
+        edges = unique_edges(face.triangles[triangles_of_one_lip(sides, face.triangles)])
         self._edges = [edges[sides[edges[:, 0]] == side] for side in (1, -1)]
         self._corners = face.landmarks[[RIGHT_CORNER, LEFT_CORNER]]
         self._ragged = parabola_residuals(_COLUMNS, _REACH)
@@ -118,9 +121,10 @@ class LipSurface:
     ) -> SurfaceQuality:
         """Of corrected meshes (F, V, 3) and the base track's (F, V, 3), in the camera's world, mm."""
         frames = range(len(corrected_mm))
-        folded = [len(self.folded_triangles(corrected_mm[f], base_mm[f])) for f in frames]
+        folded = [len(self._folds.folded_triangles(corrected_mm[f], base_mm[f])) for f in frames]
         hidden = [self._hidden_share(corrected_mm[f], camera) for f in frames]
         return SurfaceQuality(
+            self._tolerances,
             np.array(folded, dtype=int),
             np.array(hidden, dtype=float),
             np.array(
@@ -167,22 +171,6 @@ class LipSurface:
         )
         return result * mm_per_px
 
-    def folded_triangles(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> np.ndarray:
-        """Ids (n,) of lip triangles that fold on a neighbour where the base track's do not.
-
-        Args:
-            corrected_mm, base_mm: (V, 3) meshes of one frame, mm; each in any frame.
-        """
-        folded, crease = np.cos(np.radians((FOLDED_DEG, CREASE_DEG)))
-        now, before = (
-            (normals[self._pairs[:, 0]] * normals[self._pairs[:, 1]]).sum(axis=1)
-            for normals in (self._normals(corrected_mm), self._normals(base_mm))
-        )
-        return np.unique(self._pairs[(now < folded) & (before >= crease)])
-
-    def _normals(self, vertices_mm: np.ndarray) -> np.ndarray:
-        return normalised(triangle_cross(vertices_mm, self._triangles))
-
     def _hidden_share(self, vertices_mm: np.ndarray, camera: Camera) -> float:
         """Share of the vermilion that faces the camera and has inner mouth before it."""
         corners = self._triangles[self._red]
@@ -197,19 +185,10 @@ class LipSurface:
         hits = RayCaster(vertices_mm - camera.centre_mm, self._triangles).cast(
             start * towards, towards
         )
-        before = hits.hit & (hits.distance_mm + start < distance - _BEFORE_MM)
+        before = hits.hit & (hits.distance_mm + start < distance - self._tolerances.inner_mouth_mm)
         before &= self._inside[np.maximum(hits.triangle, 0)]
         areas = triangle_areas(vertices_mm, corners) * facing
         return float((areas * before).sum() / max(areas.sum(), 1e-9))
-
-
-def adjacent_triangles(triangles: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Pairs (n, 2) of `chosen` (k,) triangle ids of `triangles` (T, 3) that share an edge."""
-    edges = np.sort(triangles[chosen][:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
-    order = np.lexsort(edges.T)
-    edges, owner = edges[order], np.repeat(chosen, 3)[order]
-    same = (edges[1:] == edges[:-1]).all(axis=1)
-    return np.stack([owner[:-1][same], owner[1:][same]], axis=1)
 
 
 def parabola_residuals(count: int, reach: int) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from vermilion.correction.surface_quality import LipSurface
+from vermilion.correction.folds import LipFolds
 from vermilion.geometry.alignment import similarity_alignment
 from vermilion.geometry.mesh import adjacency
 
@@ -24,18 +24,18 @@ class Unfolder:
     """Takes folds out of the lips of a topology; build it once.
 
     Args:
-        lips: of the topology, which finds folds.
+        folds: which finds those of the topology.
         triangles: (T, 3) of the mesh.
         neutral_mm: (V, 3) of the person, any frame: carried along where the base track's own shape folds too.
     """
 
-    def __init__(self, lips: LipSurface, triangles: np.ndarray, neutral_mm: np.ndarray):
-        self._lips, self._triangles, self._neutral_mm = lips, triangles, neutral_mm
+    def __init__(self, folds: LipFolds, triangles: np.ndarray, neutral_mm: np.ndarray):
+        self._folds, self._triangles, self._neutral_mm = folds, triangles, neutral_mm
         self._neighbours = sparse.csr_matrix(adjacency(triangles, len(neutral_mm)))
 
     def unfold(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> np.ndarray:
         """A corrected mesh (V, 3) without the folds that the base track's (V, 3) does not have, same frame."""
-        best, folded = corrected_mm, self._lips.folded_triangles(corrected_mm, base_mm)
+        best, folded = corrected_mm, self._folds.folded_triangles(corrected_mm, base_mm)
         for carried_mm in (base_mm, self._neutral_mm):
             result, left = best, folded
             for rings in _RINGS:
@@ -44,7 +44,7 @@ class Unfolder:
                 result = result.copy()
                 for inside in self._patches(np.unique(self._triangles[left]), rings):
                     self._replace(result, carried_mm, inside)
-                left = self._lips.folded_triangles(result, base_mm)
+                left = self._folds.folded_triangles(result, base_mm)
                 if len(left) < len(folded):
                     best, folded = result, left
         return best

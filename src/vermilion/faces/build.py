@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from vermilion.faces.model import FaceModel
 from vermilion.storage.errors import InputError
+
+#: Face model -> `topology_hash` of its tracker with the configuration's defaults: what a file that knows
+#: its triangles alone is of.
+TRACKER_TOPOLOGIES = {
+    "procedural": "945ef30d9c8c1df6b63ae899ca02b1406a2ca37201f0b4761e7791e5875cb7e5",
+    "ict": "e94cd18b2ee6e9754cee2b3409404b74b6bee926db864bbe2ead8b6b1685ce4e",
+}
 
 
 @dataclass(frozen=True)
@@ -32,6 +40,11 @@ class FaceModelSettings:
     seed: int
 
 
+def face_model_of(topology: str) -> str | None:
+    """The face model whose tracker has, by default, the triangles of a `topology_hash`; None: unknown."""
+    return next((name for name, known in TRACKER_TOPOLOGIES.items() if known == topology), None)
+
+
 def build_models(
     name: str, source: str | Path | None, sha256: str | None, settings: FaceModelSettings
 ) -> dict[str, FaceModel]:
@@ -39,6 +52,18 @@ def build_models(
 
     Raises InputError for another name, or where the source cannot be read or has another checksum.
     """
+    return {part: make() for part, make in _parts(name, source, sha256, settings).items()}
+
+
+def build_tracker(name: str, source: str | Path | None, settings: FaceModelSettings) -> FaceModel:
+    """The tracker alone; raises as `build_models`."""
+    return _parts(name, source, None, settings)["tracker"]()
+
+
+def _parts(
+    name: str, source: str | Path | None, sha256: str | None, settings: FaceModelSettings
+) -> dict[str, Callable[[], FaceModel]]:
+    """Part -> what builds it."""
     n_identities, slight_open = settings.studio_identities, settings.template_slight_open
     triangles, n_fitted = settings.tracker_triangles, settings.tracker_identities
     few = settings.tracker_expressions == "few"
@@ -46,13 +71,13 @@ def build_models(
         from vermilion.faces import procedural
 
         return {
-            "studio": procedural.studio_model(
+            "studio": lambda: procedural.studio_model(
                 settings.studio_spacing_mm, n_identities, settings.seed
             ),
-            "template": procedural.template_model(
+            "template": lambda: procedural.template_model(
                 slight_open, settings.template_spacing_mm, n_identities
             ),
-            "tracker": procedural.tracker_model(triangles, n_fitted, few=few),
+            "tracker": lambda: procedural.tracker_model(triangles, n_fitted, few=few),
         }
     if name == "ict" and source:
         from vermilion.faces import ict
@@ -61,15 +86,12 @@ def build_models(
         if sha256 and Path(source).is_file():
             check_archive(source, sha256)
         data = read_ict(source, max(n_identities, n_fitted))
+        expressions = ict.FEW_EXPRESSIONS if few else data.expression_names
         return {
-            "studio": ict.studio_model(data, n_identities),
-            "template": ict.template_model(data, slight_open, n_identities),
-            "tracker": ict.tracker_model(
-                data,
-                triangles,
-                slight_open,
-                n_fitted,
-                ict.FEW_EXPRESSIONS if few else data.expression_names,
+            "studio": lambda: ict.studio_model(data, n_identities),
+            "template": lambda: ict.template_model(data, slight_open, n_identities),
+            "tracker": lambda: ict.tracker_model(
+                data, triangles, slight_open, n_fitted, expressions
             ),
         }
     raise InputError(

@@ -1,4 +1,4 @@
-"""One way to read a take's images, wherever they lie: capture folder, frame folder or video."""
+"""One way to read a take's images, wherever they lie: capture folder, frame folder, video or one image."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 
 from vermilion.imaging.images import (
     AS_TAGGED,
-    IMAGE_SUFFIXES,
     ImageReading,
     image_size,
     read_image,
     srgb_to_linear,
 )
 from vermilion.imaging.numbering import numbered_files
-from vermilion.imaging.source import VIDEO_SUFFIXES, Source, is_video, source_path
+from vermilion.imaging.source import (
+    IMAGE_SUFFIXES,
+    VIDEO_SUFFIXES,
+    Source,
+    is_image,
+    is_video,
+    source_path,
+)
 from vermilion.storage.errors import InputError
 
 
@@ -32,7 +38,7 @@ class FrameSource(Protocol):
 
 
 class FolderFrames:
-    """`<folder>/<frame>.<suffix>`, in one folder or several chunks; the camera is ignored."""
+    """`<folder>/<frame>.<suffix>`, in one folder or several chunks, or one image; the camera is ignored."""
 
     def __init__(
         self,
@@ -131,7 +137,7 @@ class VideoFrames:
 def open_frames(
     source: Source | Sequence[str | Path], subject: str = "", take: str = ""
 ) -> FrameSource:
-    """Open a capture folder, a folder (or several) of numbered frames, or a video file.
+    """Open a capture folder, a folder (or several) of numbered frames, a video file, or a single image.
 
     A mapping (see `imaging.source`) also says how image files are read.
     """
@@ -142,11 +148,11 @@ def open_frames(
         return VideoFrames(path, subject, take)
     if (path / "frames").is_dir():
         return CaptureFrames(path, subject, take, reading)
-    if path.is_dir():
+    if path.is_dir() or (is_image(path) and path.exists()):
         return FolderFrames([path], subject, take, reading)
     raise InputError(
-        "neither a folder nor a video",
-        f"a capture folder, a folder of frames, or one of {', '.join(VIDEO_SUFFIXES)}",
+        "neither a folder nor a video or image",
+        f"a capture folder, a folder of frames, or one of {', '.join(VIDEO_SUFFIXES + IMAGE_SUFFIXES)}",
         "Correct the `source` of the take sheet.",
         subject=subject,
         take=take,
@@ -170,8 +176,11 @@ def reading_of(source: Source) -> ImageReading:
 
 
 def list_frames(folder: str | Path) -> dict[int, Path]:
-    """Frame number -> file of a folder of numbered images, in order of number.
+    """Frame number -> file of a folder of numbered images, in order of number; a single image is frame 0.
 
     Raises InputError where the folder holds two sequences, or two files of one number.
     """
-    return numbered_files(folder, IMAGE_SUFFIXES)
+    path = Path(folder)
+    if is_image(path):
+        return {0: path} if path.exists() else {}
+    return numbered_files(path, IMAGE_SUFFIXES)

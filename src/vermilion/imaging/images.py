@@ -20,10 +20,6 @@ from vermilion.storage.files import atomic_path
 LINEAR_SUFFIXES = (".exr", ".hdr")
 #: Formats whose pixel aspect is one of the image, not of a sheet of paper.
 _WITH_ASPECT = ("openexr", "dpx")
-IMAGE_SUFFIXES = (
-    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr"),
-    *(".dpx", ".bmp", ".tga", ".webp"),
-)
 #: Transfers of DPX that are no display values.
 _FILM_TRANSFERS = ("Printing density", "Logarithmic", "Linear")
 

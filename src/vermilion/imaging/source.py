@@ -9,6 +9,10 @@ from pathlib import Path
 Source = str | Path | Mapping[str, str]
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
+IMAGE_SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr"),
+    *(".dpx", ".bmp", ".tga", ".webp"),
+)
 
 
 def source_path(source: Source) -> Path:
@@ -21,10 +25,21 @@ def is_video(source: Source) -> bool:
     return source_path(source).suffix.lower() in VIDEO_SUFFIXES
 
 
+def is_image(source: Source) -> bool:
+    """Whether a source is a single image: a take of one frame."""
+    path = source_path(source)
+    return path.suffix.lower() in IMAGE_SUFFIXES and not path.is_dir()
+
+
+def is_single_file(source: Source) -> bool:
+    """Whether a source is a file, a video or a single image: of one camera, which has no name."""
+    return is_video(source) or is_image(source)
+
+
 def folder_of(source: Source, name: str) -> Path:
     """Folder `name` (`cameras`, `labels`, `calibration`) of a source.
 
-    `<capture>/labels` of a folder, `clip.mp4.labels` beside a video file.
+    `<capture>/labels` of a folder, `clip.mp4.labels` beside a file.
     """
     path = source_path(source)
-    return path.with_name(f"{path.name}.{name}") if is_video(source) else path / name
+    return path.with_name(f"{path.name}.{name}") if is_single_file(source) else path / name

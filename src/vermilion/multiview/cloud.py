@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from vermilion.geometry.cell_keys import cell_keys
 from vermilion.geometry.mesh import Mesh, normalised, vertex_normals
 from vermilion.multiview.stereo import Cloud
 from vermilion.storage.files import atomic_path
@@ -45,8 +46,7 @@ def fuse(cloud: Cloud, spacing_mm: float, neighbours: int = 40, rounds: int = 2)
     if len(cloud) < neighbours:
         return cloud
     cloud = thinned(cloud, spacing_mm / 2)  # so that the neighbours fill the Gaussian
-    voxel = np.floor(cloud.points_mm / spacing_mm).astype(np.int64)
-    _, first = np.unique(voxel, axis=0, return_index=True)
+    _, first = np.unique(_voxels(cloud, spacing_mm), return_index=True)
     seeds = cloud.select(np.sort(first))
     tree = cKDTree(cloud.points_mm)
     points, normals = seeds.points_mm, seeds.normals
@@ -75,9 +75,7 @@ def fuse(cloud: Cloud, spacing_mm: float, neighbours: int = 40, rounds: int = 2)
 
 def thinned(cloud: Cloud, spacing_mm: float) -> Cloud:
     """The mean point and normal of each voxel, weighted by 1 / sigma^2."""
-    voxel = np.floor(cloud.points_mm / spacing_mm).astype(np.int64)
-    _, inverse = np.unique(voxel, axis=0, return_inverse=True)
-    inverse = inverse.reshape(-1)
+    _, inverse = np.unique(_voxels(cloud, spacing_mm), return_inverse=True)
     weight = 1.0 / cloud.sigma_mm**2
     total = np.bincount(inverse, weight)
 
@@ -89,6 +87,11 @@ def thinned(cloud: Cloud, spacing_mm: float) -> Cloud:
     normals = normalised(mean(cloud.normals))
     # matched pixels share errors, so that a voxel is not surer by the root of its count
     return Cloud(mean(cloud.points_mm), normals, np.sqrt(count / total))
+
+
+def _voxels(cloud: Cloud, spacing_mm: float) -> np.ndarray:
+    """(N,) int64 key of the voxel in which each point of a cloud lies."""
+    return cell_keys(np.floor(cloud.points_mm / spacing_mm).astype(np.int64))
 
 
 def screened_poisson(cloud: Cloud, depth: int, trim_mm: float) -> Mesh:

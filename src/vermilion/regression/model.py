@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -16,6 +18,8 @@ from vermilion.regression.linear import LinearOutputs
 from vermilion.storage.errors import ModelFileError
 from vermilion.storage.files import atomic_path
 from vermilion.storage.hdf5 import DAMAGE, open_hdf5
+
+Found = TypeVar("Found")
 
 FORMAT = "vermilion-regressor"
 FORMAT_VERSION = 4
@@ -174,7 +178,15 @@ def load_model(path: str | Path) -> LipModel:
     Raises ModelFileError, each with its own message, where the file is damaged, is no model, or
     comes from a newer version.
     """
+    return _from_file(path, _read)
 
+
+def model_topology(path: str | Path) -> str:
+    """`topology_hash` of the mesh that a model file is for, from its header; raises as `load_model`."""
+    return _from_file(path, lambda file: str(file.attrs["topology_sha256"]))
+
+
+def _from_file(path: str | Path, read: Callable[[h5py.File], Found]) -> Found:
     def unreadable(why: str) -> ModelFileError:
         return ModelFileError(
             f"a truncated or damaged model file ({why})",
@@ -186,7 +198,7 @@ def load_model(path: str | Path) -> LipModel:
     with open_hdf5(path, unreadable) as file:
         try:
             _check_header(file, path)
-            return _read(file)
+            return read(file)
         except DAMAGE as error:
             raise unreadable(f"{error}") from error
 

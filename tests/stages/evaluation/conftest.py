@@ -37,6 +37,7 @@ MODELS = (
 CFG = {
     "evaluation.reference": ReferenceConfig().model_dump(),
     "evaluation.measures": MeasuresConfig(bootstrap_samples=200).model_dump(),
+    "evaluation.measures.surface": MeasuresConfig().surface.model_dump(),
     "evaluation.contour": ContourConfig(shapes=8).model_dump(),
     "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
     "evaluation.figures.map_frames": 2,

@@ -5,12 +5,13 @@ import numpy as np
 from vermilion.baselines.null import NAME as NULL
 from vermilion.baselines.null import null_model
 from vermilion.config.apply import OverlayConfig
-from vermilion.config.correction import CorrectionConfig
+from vermilion.config.correction import CorrectionConfig, ImageAgreementConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct
+from vermilion.correction.folds import LipFolds
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
-from vermilion.correction.surface_quality import LipSurface, surface_figures
+from vermilion.correction.surface_quality import LipSurface, SurfaceTolerances, surface_figures
 from vermilion.correspondence.correspondence import CorrespondenceSettings
 from vermilion.correspondence.neutral import model_mouth_mask
 from vermilion.export.shots import framing, overlay_frames
@@ -70,6 +71,13 @@ def novelty_of(model, take):
     return novelty, model.novelty_limit
 
 
+def lip_surface(tracker, cfg):
+    """What measures the surface of the lips."""
+    image = ImageAgreementConfig(**cfg["correction.image"])
+    folds = LipFolds(tracker, image.folded_deg, image.crease_deg)
+    return LipSurface(tracker, folds, SurfaceTolerances(**cfg["evaluation.measures.surface"]))
+
+
 def main(snakemake):
     inputs, params, out = snakemake.input, snakemake.params, snakemake.output
     place = (snakemake.wildcards.subject, snakemake.wildcards.take)
@@ -83,7 +91,7 @@ def main(snakemake):
     has_features = np.isfinite(take.features).all(axis=1)
     novelty, novelty_limit = novelty_of(model, take)
     moved = np.linalg.norm(corrected - take.coarse_mm, axis=2).max(axis=1)
-    lips = LipSurface(tracker).measure(corrected, take.coarse_mm, fit.camera)
+    lips = lip_surface(tracker, params.cfg).measure(corrected, take.coarse_mm, fit.camera)
     surface = lips.reasons()
     rows_of_quality = [
         quality_row(

@@ -9,14 +9,15 @@ from vermilion.baselines.contour_tracker import ContourTracker
 from vermilion.baselines.lip_shapes import LipShapes
 from vermilion.baselines.null import NAME as NULL
 from vermilion.baselines.null import null_model
-from vermilion.config.correction import CorrectionConfig
+from vermilion.config.correction import CorrectionConfig, ImageAgreementConfig
 from vermilion.config.evaluation import MeasuresConfig, ReferenceConfig
 from vermilion.config.regressors import GENERIC, is_judged, measure_name
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
+from vermilion.correction.folds import LipFolds
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.neutral_pair import load_pairs, with_known_neutrals
-from vermilion.correction.surface_quality import LipSurface
+from vermilion.correction.surface_quality import LipSurface, SurfaceTolerances
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.evaluation import held_out
 from vermilion.evaluation.errors import sums_of_surface
@@ -163,9 +164,11 @@ def all_sums(result, sequences, take, tracker, camera, contours, layer_errors):
     return sums
 
 
-def surfaces(sequences, take, tracker, camera):
+def surfaces(sequences, take, tracker, camera, cfg):
     """Quality of the surface of every sequence's lips, beside the base track's, by name."""
-    lips = LipSurface(tracker)
+    image = ImageAgreementConfig(**cfg["correction.image"])
+    tolerances = SurfaceTolerances(**cfg["evaluation.measures"]["surface"])
+    lips = LipSurface(tracker, LipFolds(tracker, image.folded_deg, image.crease_deg), tolerances)
     return {
         name: lips.measure(sequence, take.coarse_mm, camera)
         for name, sequence in sequences.items()
@@ -236,7 +239,7 @@ def main(snakemake):
     if true is not None:
         layer_errors = {n: held_out.layer_errors(of, take, true) for n, of in regressed.items()}
     sums = all_sums(result, sequences, take, tracker, fit.camera, contours, layer_errors)
-    surface = surfaces(sequences, take, tracker, fit.camera)
+    surface = surfaces(sequences, take, tracker, fit.camera, cfg)
     for name, of_lips in surface.items():
         sums[name] += sums_of_surface(of_lips, result.clips)
     save_sums(out.sums, sums, len(frames))

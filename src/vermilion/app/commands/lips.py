@@ -19,7 +19,9 @@ PASSES_ON = True
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The video, what is known of it, where to write."""
-    parser.add_argument("video", help="a video file, or a folder of numbered images")
+    parser.add_argument(
+        "video", help="a video file, a single image, or a folder of numbered images"
+    )
     parser.add_argument(
         "--model", help="`generic`, or file of a trained regressor (models/<name>.h5 of a run)"
     )
