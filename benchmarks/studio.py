@@ -24,7 +24,7 @@ from vermilion.geometry.raycast import RayCaster
 from vermilion.studio.lighting import LIGHTINGS
 from vermilion.studio.look import look_of
 from vermilion.studio.render import Scene, render
-from vermilion.studio.rig import RigSettings, lips16_rig
+from vermilion.studio.rig import MULTIVIEW_CAMERAS, RigSettings, lips16_rig
 from vermilion.studio.surface import surface_of
 
 TARGET_S = 4.0
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> None:
     vertices = model.neutral_mm
     scene = Scene(model.triangles, surface_of(model), look_of(1, True), LIGHTINGS["rig"])
     size = (512, 512)
-    settings = RigSettings(735.0, size, size, size, 245.0, 105.0, 250.0)
+    settings = RigSettings(MULTIVIEW_CAMERAS, 735.0, size, size, size, 245.0, 105.0, 250.0)
     cameras = lips16_rig(model, vertices, settings)
 
     def each_by_itself():

@@ -27,7 +27,7 @@ from vermilion.imaging.images import srgb_to_linear
 from vermilion.studio.lighting import LIGHTINGS
 from vermilion.studio.look import look_of
 from vermilion.studio.render import Scene, render
-from vermilion.studio.rig import RigSettings, video_camera
+from vermilion.studio.rig import MULTIVIEW_CAMERAS, RigSettings, video_camera
 from vermilion.studio.sensor import sensor_noise
 from vermilion.studio.surface import StudioSurface, surface_of
 
@@ -158,7 +158,7 @@ class WrinkledActor:
     def camera(self) -> Camera:
         """In front of the face."""
         size = self.size_px
-        settings = RigSettings(735.0, size, size, size, 245.0, 105.0, 250.0)
+        settings = RigSettings(MULTIVIEW_CAMERAS, 735.0, size, size, size, 245.0, 105.0, 250.0)
         return video_camera(self.studio, self.studio.neutral_of(self._identity), settings)["cam"]
 
     @cached_property

@@ -22,12 +22,14 @@ from vermilion.studio.capture_writer import (
 from vermilion.studio.label_frames import label_frames
 from vermilion.studio.labels import lip_contours, view_mouth
 from vermilion.studio.render import render
-from vermilion.studio.rig import RigSettings
+from vermilion.studio.rig import MULTIVIEW_CAMERAS, RigSettings
 from vermilion.studio.surface import surface_of
 from vermilion.studio.take import cameras_of, plan_take
 from vermilion.studio.take_settings import take_settings
 
-SIZES = RigSettings(735.0, (200, 200), (240, 200), (240, 200), 245.0, 105.0, 250.0)
+SIZES = RigSettings(
+    MULTIVIEW_CAMERAS, 735.0, (200, 200), (240, 200), (240, 200), 245.0, 105.0, 250.0
+)
 RAYS = {"occlusion_directions": 32, "light_samples": 2}
 
 

@@ -1,13 +1,19 @@
 """The synthetic rig: ten cameras in pairs, aimed at this actor's face and lips."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from tests.heads import small_tracker
+from vermilion.config.studio import StudioConfig
 from vermilion.geometry.camera import read_cameras, write_cameras
 from vermilion.studio import rig
 
-SETTINGS = rig.RigSettings(735.0, (512, 512), (480, 384), (640, 480), 245.0, 105.0, 250.0)
+SETTINGS = rig.RigSettings(
+    rig.MULTIVIEW_CAMERAS, 735.0, (512, 512), (480, 384), (640, 480), 245.0, 105.0, 250.0
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +35,21 @@ def test_three_pairs_on_the_face_and_two_on_the_lips(cameras):
         assert 80 < baseline < 260  # mm
         angle = np.degrees(np.arccos(a.rotation[2] @ b.rotation[2]))
         assert 6 < angle < 20  # degrees between the axes of a pair
+
+
+def test_a_smaller_rig_has_the_same_cameras_where_they_were(face, cameras):
+    names = ("face1", "face2", "face3", "face4", "lip0", "lip1")
+    fewer = rig.lips16_rig(face, face.neutral_mm, replace(SETTINGS, cameras=names))
+    assert tuple(fewer) == names == rig.camera_names("tattoo", names)
+    assert all(np.array_equal(fewer[name].centre_mm, cameras[name].centre_mm) for name in names)
+
+
+def test_the_configuration_names_the_cameras_of_the_rig():
+    assert tuple(StudioConfig().cameras) == rig.MULTIVIEW_CAMERAS
+    with pytest.raises(ValidationError, match="cameras lacks face3 of the frontal pair"):
+        StudioConfig(cameras=["face2", "lip0"])
+    with pytest.raises(ValidationError, match="twice: face2, face3, face2"):
+        StudioConfig(cameras=["face2", "face3", "face2"])
 
 
 def test_lip_cameras_look_at_the_middle_of_the_lips(face, cameras):

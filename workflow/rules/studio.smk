@@ -20,6 +20,7 @@ STUDIO_PLAN_KEYS = (
     "head_shift_mm",
 )
 STUDIO_CAMERA_KEYS = (
+    "cameras",
     "camera_distance_mm",
     "face_size_px",
     "lip_size_px",
@@ -83,7 +84,7 @@ def studio_contour_labels(take):
     """[camera, frame] of the contours that a person would draw."""
     if take.role == "plain" or studio_performance(take).performance == "people":
         return []
-    camera = FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role)[0]
+    camera = FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role, CONFIG.studio.cameras)[0]
     frames = label_frames(take.first, take.last, CONFIG.studio.contour_labels)
     return [[camera, frame] for frame in frames]
 
@@ -91,7 +92,7 @@ def studio_contour_labels(take):
 def studio_landmark_labels(take):
     """[camera, frame] of the landmarks that a person would mark: the neutral, seen by the frontal
     pair; every frame of a `people` take."""
-    cameras = FRONTAL_PAIR if take.is_multiview else camera_names(take.role)
+    cameras = FRONTAL_PAIR if take.is_multiview else camera_names(take.role, CONFIG.studio.cameras)
     people = studio_performance(take).performance == "people"
     frames = take.frames if people else [take.first]
     return [[camera, frame] for camera in cameras for frame in frames]
@@ -132,7 +133,7 @@ def studio_frames(take, frames):
     folder = fill(P.capture_folder, take) + "/frames"
     return [
         f"{folder}/{camera}/{frame:06d}.png"
-        for camera in camera_names(take_of(take).role)
+        for camera in camera_names(take_of(take).role, CONFIG.studio.cameras)
         for frame in frames
     ]
 

@@ -40,7 +40,7 @@ def _studio_sizes(role: str, studio: StudioConfig) -> list[tuple[int, int]]:
         **dict.fromkeys(LIP_ANGLES_DEG, studio.lip_size_px),
         **dict.fromkeys(VIDEO_CAMERAS, studio.video_size_px),
     }
-    return [of_group[name] for name in camera_names(role)]
+    return [of_group[name] for name in camera_names(role, studio.cameras)]
 
 
 def _sizes(source: Path, reading: ImageReading) -> list[tuple[int, int]]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import Field, model_validator
 
 from vermilion.config.base import StageConfig
+
+RigCamera = Literal[
+    "face0", "face1", "face2", "face3", "face4", "face5", "lip0", "lip1", "lip2", "lip3"
+]
 
 
 class StudioTake(StageConfig):
@@ -106,6 +110,11 @@ class StudioConfig(StageConfig):
         description="How far each actor's expressions are their own: gain, direction and a smooth field for "
         "each shape (0: those of the face model; 1: as different as people are).",
     )
+    cameras: list[RigCamera] = Field(
+        list(get_args(RigCamera)),
+        description="Cameras of the rig: `face0` to `face5` from right to left, of which the frontal pair, "
+        "`face2` and `face3`, cannot be left out; `lip0` and `lip1` from above, `lip2` and `lip3` from below.",
+    )
     face_size_px: tuple[int, int] = Field(
         (512, 512), description="Width and height of the six face cameras' images (px)."
     )
@@ -177,3 +186,14 @@ class StudioConfig(StageConfig):
         6, ge=0, le=1000, description="Labelled contour frames of a take (frames)."
     )
     seed: int = Field(0, ge=0, description="Seed that is combined with all other seeds.")
+
+    @model_validator(mode="after")
+    def _check_cameras(self) -> StudioConfig:
+        if len(set(self.cameras)) < len(self.cameras):
+            raise ValueError(f"cameras names a camera twice: {', '.join(self.cameras)}")
+        missing = [name for name in ("face2", "face3") if name not in self.cameras]
+        if missing:
+            raise ValueError(
+                f"cameras lacks {' and '.join(missing)} of the frontal pair, which carries the labels; add it"
+            )
+        return self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,11 +32,13 @@ class RigSettings:
     """Where the cameras stand and what they see; the head frame of the actor's neutral is the world.
 
     Attributes:
+        cameras: names of those of `MULTIVIEW_CAMERAS` that the rig has.
         camera_distance_mm: from what a camera looks at.
         face_size_px, lip_size_px, video_size_px: (width, height) of an image.
         face_view_mm, lip_view_mm, video_view_mm: height that an image covers there.
     """
 
+    cameras: tuple[str, ...]
     camera_distance_mm: float
     face_size_px: tuple[int, int]
     lip_size_px: tuple[int, int]
@@ -45,15 +48,15 @@ class RigSettings:
     video_view_mm: float
 
 
-def camera_names(role: str) -> tuple[str, ...]:
-    """Cameras of a take of this role."""
-    return MULTIVIEW_CAMERAS if role in ("tattoo", "plain") else VIDEO_CAMERAS
+def camera_names(role: str, rig: Sequence[str]) -> tuple[str, ...]:
+    """Cameras of a take of this role, where the rig has these."""
+    return tuple(rig) if role in ("tattoo", "plain") else VIDEO_CAMERAS
 
 
 def lips16_rig(
     model: FaceModel, neutral_mm: np.ndarray, settings: RigSettings
 ) -> dict[str, Camera]:
-    """Ten cameras aimed at the actor whose neutral `neutral_mm` (V, 3) is given, head frame."""
+    """The rig's cameras, aimed at the actor whose neutral `neutral_mm` (V, 3) is given, head frame."""
     lips = lips_centre(model, neutral_mm)
     face = face_centre(model, neutral_mm)
     distance, cameras = settings.camera_distance_mm, {}
@@ -63,7 +66,7 @@ def lips16_rig(
     ):
         for name, (turn, height) in angles.items():
             cameras[name] = aimed_camera(name, target, turn, height, distance, size, view)
-    return cameras
+    return {name: cameras[name] for name in settings.cameras}
 
 
 def video_camera(
