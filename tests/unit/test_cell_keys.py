@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,8 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from vermilion.geometry.cell_keys import cell_keys
-from vermilion.multiview.cloud import thinned
-from vermilion.multiview.stereo import Cloud
 
 FAR = 2**62
 
@@ -49,14 +45,3 @@ def test_cells_that_no_key_can_tell_apart_are_refused():
     cells = np.tile(np.arange(100)[:, None], (1, 10))  # 100^10 places
     with pytest.raises(ValueError, match="beyond 64 bit"):
         cell_keys(cells)
-
-
-def test_a_cloud_is_thinned_in_less_time_than_its_rows_are_sorted():
-    points = np.random.default_rng(1).uniform(-100.0, 100.0, size=(200_000, 3))
-    cloud = Cloud(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)), np.ones(len(points)))
-    thinned(cloud, 2.0)
-    begun = time.process_time()
-    thinned(cloud, 2.0)
-    between = time.process_time()
-    np.unique(np.floor(points / 2.0).astype(np.int64), axis=0, return_inverse=True)
-    assert between - begun < time.process_time() - between

@@ -22,6 +22,11 @@ def to_display_values(linear: np.ndarray) -> np.ndarray:
         from vermilion.imaging.display_kernel import display_values
 
         return display_values(np.ravel(linear)).reshape(np.shape(linear))
+    return _curve(linear)
+
+
+def _curve(linear: np.ndarray) -> np.ndarray:
+    """As `to_display_values`, not compiled."""
     linear = np.maximum(linear, 0.0)
     curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return 255.0 * np.where(linear <= 0.0031308, 12.92 * linear, curve)
@@ -45,4 +50,4 @@ def srgb8(linear: np.ndarray) -> np.ndarray:
     return look_up(np.ascontiguousarray(linear, dtype=np.float32), _SRGB8)
 
 
-_SRGB8 = np.rint(to_display_values(np.arange(_STEPS + 1) / _STEPS)).astype(np.uint8)
+_SRGB8 = np.rint(_curve(np.arange(_STEPS + 1) / _STEPS)).astype(np.uint8)
