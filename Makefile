@@ -11,7 +11,7 @@ VERMILION = $(BIN)/python -m vermilion.app
 .PHONY: help setup demo lips generic run cameras plates sketch doctor report verify clean-intermediate test test-quick test-latest test-faults test-kills test-interchange test-slurm test-cloud lint format docs reference clean
 
 # A variable that is misspelt on the command line would go unnoticed.
-TAKEN := PYTHON VENV CONFIG VIDEO MODEL SCAN OUT FIRST LAST PEOPLE TAKE FORMAT
+TAKEN := PYTHON VENV CONFIG VIDEO MODEL SCAN EYES OUT FIRST LAST PEOPLE TAKE FORMAT
 # Variables of this file, of make, and of the programs that it starts, which get what the command line sets.
 PASSED := BIN READY LANDMARKS DOCS VERMILION PYTEST MAKE% SHELL GNUMAKEFLAGS PYTHONPATH PYTHONDONTWRITEBYTECODE \
     HOME PATH TMPDIR LANG LC_% VERMILION_% SNAKEMAKE_% PYTEST_% PIP_% UV_% XDG_% OMP_% NUMBA_% \
@@ -38,7 +38,7 @@ endif
 help:
 	@echo "make demo        rebuild everything for two synthetic subjects, and say where to look"
 	@echo "make lips        better lips for VIDEO=clip.mp4 or photo.jpg: files and a page (MODEL=generic or FILE.h5,"
-	@echo "                 SCAN=neutral.obj, OUT=folder, FIRST= and LAST= frame)"
+	@echo "                 SCAN=neutral.obj or EYES=63 mm between the pupils, OUT=folder, FIRST= and LAST= frame)"
 	@echo "make run         the same for CONFIG=config/YOURS.yaml"
 	@echo "make generic     train the regressor of models/ on sixty synthetic people, or PEOPLE= (MODEL=generic)"
 	@echo "make sketch      draw the lips of TAKE=subject/take of CONFIG in a browser"
@@ -80,7 +80,8 @@ generic: setup
 
 lips: setup
 	@$(VERMILION) lips "$(VIDEO)" $(if $(MODEL),--model "$(MODEL)") $(if $(SCAN),--scan "$(SCAN)") \
-	    $(if $(OUT),--out "$(OUT)") $(if $(FIRST),--first $(FIRST)) $(if $(LAST),--last $(LAST))
+	    $(if $(EYES),--eye-distance "$(EYES)") $(if $(OUT),--out "$(OUT)") \
+	    $(if $(FIRST),--first $(FIRST)) $(if $(LAST),--last $(LAST))
 
 run: setup
 	@$(VERMILION) run "$(CONFIG)"

@@ -45,7 +45,16 @@ def test_a_video_that_is_not_there_stops_before_the_set_up(tmp_path):
 @pytest.mark.parametrize(
     "words",
     [
-        ("lips", "VIDEO=README.md", "MODEL=generic", "SCAN=a.obj", "OUT=b", "FIRST=1", "LAST=2"),
+        (
+            "lips",
+            "VIDEO=README.md",
+            "MODEL=generic",
+            "SCAN=a.obj",
+            "EYES=63",
+            "OUT=b",
+            "FIRST=1",
+            "LAST=2",
+        ),
         ("generic", "PEOPLE=2"),
         ("plates", "CONFIG=a.yaml", "TAKE=s/t", "FORMAT=png", "OUT=b"),
         ("setup", "PYTHON=python3", "VENV=/x/venv", "PIP_INDEX_URL=x", "UV_NO_INDEX=1"),

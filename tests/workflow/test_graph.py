@@ -179,3 +179,19 @@ def test_a_detector_that_nothing_trains_is_one_sentence_where_landmarks_are_need
     assert "config/tiny.yaml, key landmarks.training_takes: found none; expected" in told[0]
     assert told[0].endswith("`mediapipe` is for real faces.")
     assert told[1:] == [f"Log: {tmp_path / 's.log'}"]
+
+
+@pytest.mark.slow
+def test_a_measured_person_has_a_face_model_of_their_size(tmp_path, fresh_project):
+    """One job more, of that person alone; what is tracked of them reads it."""
+    lines = (ROOT / "config" / "takes.tiny.tsv").read_text().splitlines()
+    measured = "s1\tphone\t"
+    rows = [line + ("\t62.5" if line.startswith(measured) else "\t") for line in lines[1:]]
+    sheet = tmp_path / "takes.tsv"
+    sheet.write_text("\n".join([lines[0] + "\teye_distance_mm", *rows]) + "\n")
+    run = fresh_project.snakemake("--dry-run", "--config", f"takes={sheet}")
+    jobs = jobs_of(run.stdout + run.stderr)
+    own = [outputs for rule, _, outputs in jobs if rule == "sized_tracker"]
+    assert len(own) == 1 and "/subjects/s1/tracker.npz" in own[0]
+    readers = {rule for rule, inputs, _ in jobs if "/subjects/s1/tracker.npz" in inputs}
+    assert {"tracking", "tracking_meshes", "evaluate"} <= readers

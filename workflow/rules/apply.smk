@@ -259,8 +259,11 @@ def face_model_said(wildcards):
     """The face model of a take's track, as its page says it."""
     if EXTERNAL:
         return "that of another tracker"
-    scanned = wildcards.subject in CONFIG.tracking.scans
-    return CONFIG.face_model.title + (", made from a scan of the person" if scanned else "")
+    if wildcards.subject in CONFIG.tracking.scans:
+        return CONFIG.face_model.title + ", made from a scan of the person"
+    if wildcards.subject in MEASURED:
+        return f"{CONFIG.face_model.title}, pupils {MEASURED[wildcards.subject]:g} mm apart"
+    return CONFIG.face_model.title
 
 
 rule lips_page:

@@ -24,7 +24,7 @@ from snakemake.exceptions import WorkflowError
 from vermilion.config.external_base import sequences_of
 from vermilion.config.load import load_configuration, read_keys
 from vermilion.config.skip import without_skipped
-from vermilion.config.takes import STUDIO, Take
+from vermilion.config.takes import STUDIO, Take, eye_distances
 from vermilion.storage.errors import VermilionError
 from vermilion.config.regressors import (
     GENERIC,
@@ -69,6 +69,8 @@ send_with_sources(CONFIG.takes)
 _TAKES = {take.name: take for take in TAKES}
 #: Name of a take -> the row of another tracker's sequence that is its base; empty: our own tracker's is.
 EXTERNAL = sequences_of(TAKES)
+#: Subject -> measured distance of the pupils (mm).
+MEASURED = eye_distances(TAKES)
 
 
 wildcard_constraints:
@@ -301,8 +303,9 @@ def base_model(wildcards=None):
 
 
 def tracker_of(wildcards):
-    """The base's face model for a subject: their own, made from a scan, or everybody's."""
-    if wildcards.subject in CONFIG.tracking.scans and not EXTERNAL:
+    """The base's face model for a subject: their own, of a scan or of their size, or everybody's."""
+    own = wildcards.subject in CONFIG.tracking.scans or wildcards.subject in MEASURED
+    if own and not EXTERNAL:
         return P.own_tracker.format(subject=wildcards.subject)
     return base_model()
 

@@ -84,7 +84,9 @@ def studio_contour_labels(take):
     """[camera, frame] of the contours that a person would draw."""
     if take.role == "plain" or studio_performance(take).performance == "people":
         return []
-    camera = FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role, CONFIG.studio.cameras)[0]
+    camera = (
+        FRONTAL_PAIR[0] if take.is_multiview else camera_names(take.role, CONFIG.studio.cameras)[0]
+    )
     frames = label_frames(take.first, take.last, CONFIG.studio.contour_labels)
     return [[camera, frame] for frame in frames]
 

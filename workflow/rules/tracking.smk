@@ -51,6 +51,36 @@ def image_identity_subjects():
     return {take.subject for take in takes(TRACKED_ROLES)} - set(CONFIG.tracking.scans)
 
 
+rule sized_tracker:
+    """Gives a subject's face model the size that the distance of their pupils tells: subjects/{subject}/tracker.npz."""
+    input:
+        tracker=P.tracker,
+        landmarks=of_identity_takes(P.landmarks),
+        cameras=of_identity_takes(P.cameras),
+        calibration=of_identity_takes(P.calibration),
+    output:
+        tracker=P.own_tracker,
+    log:
+        P.log("sized_tracker", "subject"),
+    benchmark:
+        P.benchmark("sized_tracker", "subject")
+    wildcard_constraints:
+        subject=one_of(MEASURED),
+    resources:
+        mem_mb=growing(1500),
+        runtime=growing(30),
+    params:
+        cfg=cfg_of("tracking.fit", "tracking.identity"),
+        code=code_of("tracking/sized_tracker"),
+        takes=sampled_takes,
+        eye_distance_mm=lambda wildcards: MEASURED[wildcards.subject],
+    script:
+        "../scripts/tracking/sized_tracker.py"
+
+
+ruleorder: sized_tracker > scan
+
+
 rule identity:
     """Finds the person in landmarks of frames of all takes: subjects/{subject}/identity.npz."""
     input:

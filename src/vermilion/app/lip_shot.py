@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
@@ -38,6 +38,7 @@ class LipShot:
         model: file of a trained regressor; None: contours alone.
         scan: a scan of the person; None where there is none.
         first, last: frames; None: from the first, to the last one.
+        eye_distance_mm: measured distance of the person's pupils; None: nobody measured it.
     """
 
     video: Path
@@ -47,15 +48,12 @@ class LipShot:
     scan: Path | None = None
     first: int | None = None
     last: int | None = None
+    eye_distance_mm: float | None = None
 
     @property
     def take(self) -> str:
         """Name of the take: the file's, in the letters that a take may have."""
         return take_name(self.video.stem if self.video.is_file() else self.video.name)
-
-    def into(self, results: str) -> LipShot:
-        """The same with another folder of results."""
-        return replace(self, results=results)
 
     @property
     def configuration(self) -> Path:
@@ -104,6 +102,8 @@ def write_shot(shot: LipShot, cores: int = 1) -> tuple[int, int]:
         f"{fps:.6g}",
         "none",
     ]
+    if shot.eye_distance_mm is not None:
+        columns, row = [*columns, "eye_distance_mm"], [*row, f"{shot.eye_distance_mm:g}"]
     _write_changed(sheet, "\t".join(columns) + "\n" + "\t".join(row) + "\n")
     n_frames = last - first + 1
     chunk = min(max(ceil(n_frames / cores), LEAST_CHUNK), MOST_CHUNK)

@@ -22,7 +22,8 @@ from vermilion.app.lips_ending import ending
 from vermilion.app.run import run_all
 from vermilion.app.workflow import TELLING
 from vermilion.config.regressors import GENERIC, generic_file
-from vermilion.config.takes import read_takes
+from vermilion.config.sheet_numbers import eye_distance_problem
+from vermilion.config.takes import Take, read_takes
 from vermilion.storage.errors import InputError, VermilionError
 
 #: Rule -> seconds of a job: to start, and of each frame. For the time left alone.
@@ -46,6 +47,7 @@ def correct_lips(
     *,
     model: str | None,
     scan: str | None,
+    eye_distance: str | None = None,
     out: str | None,
     span: tuple[int | None, int | None],
     options: Sequence[str],
@@ -55,6 +57,7 @@ def correct_lips(
     Args:
         video, model, scan: files of the user, from the folder that they are in. The model `generic` is that
             of the project's `models/` for the face model that is used.
+        eye_distance: measured distance of the person's pupils, mm; None: the size is the face model's.
         out: folder of the results; None: results/lips/<clip> of the project.
         span: first and last frame; None where the file's counts.
         options: of Snakemake.
@@ -77,7 +80,7 @@ def correct_lips(
     shot = LipShot(source, "", {}, given.get("model"), given.get("scan"), *span)
     frames_of_shot(shot)  # a video that cannot be read stops here, before anything is fetched
     results = place.from_here(folder, project) if folder else f"results/lips/{shot.take}"
-    shot = shot.into(results)
+    shot = replace(shot, results=results, eye_distance_mm=_eye_distance(eye_distance, scan))
     face = face_model(before=face_model_before(shot.configuration), results=results)
     print(face.said, file=sys.stderr)
     if model == GENERIC:
@@ -87,9 +90,7 @@ def correct_lips(
     n_frames, chunk = write_shot(replace(shot, face_model=face.section), os.cpu_count() or 1)
     frames = "1 frame" if n_frames == 1 else f"{n_frames} frames"
     print(f"{frames} of {source.name} -> {results}", file=sys.stderr)
-    takes, problems = read_takes(str(Path(results) / "takes.tsv"))
-    if problems:
-        raise InputError("; ".join(problems), "a take sheet", "Report this.")
+    takes = _takes(Path(results) / "takes.tsv")
     configuration = str(Path(results) / "config.yaml")
     code, skipped = run_all(
         configuration, Path(results), takes, [*options, *_shared()], {},
@@ -101,6 +102,25 @@ def correct_lips(
     if code == 0 and not TELLING.intersection(options):
         print("\n".join(ending(Path(results), takes[0], face, shot.model)))
     return code
+
+
+def _takes(sheet: Path) -> list[Take]:
+    """The takes of a sheet that was just written."""
+    takes, problems = read_takes(str(sheet))
+    if problems:
+        raise InputError("; ".join(problems), "a take sheet", "Report this.")
+    return takes
+
+
+def _eye_distance(text: str | None, scan: str | None) -> float | None:
+    """The user's EYES. Raises VermilionError where it is none, or there is a scan too."""
+    if not text:
+        return None
+    if problem := eye_distance_problem(text):
+        raise VermilionError(f"EYES: {problem} Correct it.")
+    if scan:
+        raise VermilionError("Give SCAN or EYES, not both: a scan has a size of its own.")
+    return float(text)
 
 
 def _shared() -> list[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from vermilion.config.external_base import external_checks
+from vermilion.config.external_base import external_checks, sequences_of
 from vermilion.config.own_head import head_checks
 from vermilion.config.root import Configuration
-from vermilion.config.takes import STUDIO, Take
+from vermilion.config.takes import STUDIO, Take, eye_distances
 
 #: Roles whose takes have a coarse track and contours from one camera's images.
 IMAGE_ROLES = ("video", "tattoo")
@@ -19,6 +19,7 @@ def cross_checks(configuration: Configuration, takes: list[Take]) -> Iterator[st
     subjects = {take.subject for take in takes}
     yield from _studio(configuration, takes, subjects)
     yield from _scans(configuration, subjects)
+    yield from _eye_distances(configuration, takes)
     yield from _applied(configuration, by_name)
     yield from _neutral_frames(configuration, by_name)
     detail = configuration.detail
@@ -63,6 +64,20 @@ def _scans(configuration: Configuration, subjects: set[str]) -> Iterator[str]:
             yield (
                 f"{key}.landmarks: found nothing; expected a file, because landmarks.detector is "
                 "`files` and nothing finds landmarks in images."
+            )
+
+
+def _eye_distances(configuration: Configuration, takes: list[Take]) -> Iterator[str]:
+    for subject, distance in eye_distances(takes).items():
+        if subject in configuration.tracking.scans:
+            yield (
+                f"tracking.scans.{subject}: found a scan, and eye_distance_mm {distance:g} in the take sheet; "
+                "expected one of them, as a scan has a size of its own. Empty the cell, or remove the scan."
+            )
+        if sequences_of(takes):
+            yield (
+                f"takes: found eye_distance_mm {distance:g} of subject {subject}; expected none beside another "
+                "tracker's sequence, which has a size of its own. Empty the cell."
             )
 
 

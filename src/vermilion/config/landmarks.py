@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from vermilion.config.base import StageConfig, section
-from vermilion.config.takes import face_problem
+from vermilion.config.sheet_numbers import face_problem
 
 
 class NetworksConfig(StageConfig):

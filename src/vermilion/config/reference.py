@@ -62,6 +62,12 @@ def take_sheet_schema() -> dict[str, Any]:
             "image's longer side (millimetres of a full-frame lens over 36). Empty: estimated. The column may "
             "be left out.",
         },
+        "eye_distance_mm": {
+            "anyOf": [{"type": "number", "minimum": 30, "maximum": 100}, {"const": ""}],
+            "description": "Measured distance of the subject's pupils, looking far ahead (mm), in one row of "
+            "theirs: one camera does not tell how large a head is. Empty: the size is the face model's. The "
+            "column may be left out.",
+        },
         "of": {
             "type": "string",
             "description": "Of a `tracked` row: the take of the same subject whose images the sequence was "

@@ -9,7 +9,7 @@ from vermilion.storage.tables import shortened
 
 COLUMNS = ("subject", "take", "role", "source", "first", "last", "fps", "split")
 #: Columns that may be left out.
-OPTIONAL_COLUMNS = ("face", "focal", "of")
+OPTIONAL_COLUMNS = ("face", "focal", "of", "eye_distance_mm")
 
 
 def read_cells(path: Path) -> tuple[list[dict[str, str]], list[str]]:

@@ -12,6 +12,7 @@ from typing import Literal, cast, get_args
 
 from vermilion.config.frame_range import frame_range
 from vermilion.config.sheet_cells import COLUMNS, OPTIONAL_COLUMNS, read_cells
+from vermilion.config.sheet_numbers import eye_distance_of, face_of, focal_of
 from vermilion.storage.errors import InputError
 
 Role = Literal["tattoo", "plain", "video", "tracked"]
@@ -40,6 +41,7 @@ class Take:
         focal: known focal length of a single camera, in lengths of the image's longer side; None: not known.
         of: take of the same subject whose images a `tracked` sequence was tracked in; it has that take's
             frames and is its base. Empty: none.
+        eye_distance_mm: measured distance of the subject's pupils, in any of their rows; None: not known.
     """
 
     subject: str
@@ -53,6 +55,7 @@ class Take:
     face: tuple[float, ...] = ()
     focal: float | None = None
     of: str = ""
+    eye_distance_mm: float | None = None
 
     @property
     def name(self) -> str:
@@ -92,6 +95,11 @@ def _held_out(take: Take) -> tuple[tuple[int, ...], tuple[int, ...]]:
     for frame in take.frames:
         parts[frame not in held].append(frame)
     return tuple(parts[0]), tuple(parts[1])
+
+
+def eye_distances(takes: Sequence[Take]) -> dict[str, float]:
+    """Subject -> measured distance of the pupils (mm), of those for whom a row has one."""
+    return {take.subject: take.eye_distance_mm for take in takes if take.eye_distance_mm}
 
 
 def stretches(split: str) -> list[tuple[int, int]]:
@@ -155,9 +163,10 @@ def _parse(row: dict[str, str]) -> tuple[Take | None, list[str]]:
         wrong.append(f"fps: found {numbers['fps']}; expected more than 0 frames a second.")
     split = value["split"] or "none"
     wrong += _split_problems(split, numbers)
-    face, reason = _face(value["face"])
-    focal, reason_of_focal = _focal(value["focal"])
-    wrong += [text for text in (reason, reason_of_focal) if text]
+    face, reason = face_of(value["face"])
+    focal, reason_of_focal = focal_of(value["focal"])
+    eyes, reason_of_eyes = eye_distance_of(value["eye_distance_mm"])
+    wrong += [text for text in (reason, reason_of_focal, reason_of_eyes) if text]
     if wrong:
         return None, wrong
     take = Take(
@@ -172,6 +181,7 @@ def _parse(row: dict[str, str]) -> tuple[Take | None, list[str]]:
         face,
         focal,
         value["of"],
+        eyes,
     )
     return take, []
 
@@ -215,41 +225,6 @@ def _split_problems(split: str, numbers: dict[str, float]) -> list[str]:
     ]
 
 
-def _face(text: str) -> tuple[tuple[float, ...], str]:
-    """The numbers of the column `face`, and a sentence where they are none."""
-    try:
-        numbers = [float(part) for part in text.split(",")] if text else []
-    except ValueError:
-        return (), f"face: found '{text}'; expected numbers separated by commas, or nothing."
-    return tuple(numbers), face_problem(numbers)
-
-
-def _focal(text: str) -> tuple[float | None, str]:
-    """The number of the column `focal`, and a sentence where it is none."""
-    try:
-        focal = float(text) if text else None
-    except ValueError:
-        focal = math.nan
-    if focal is None or 0.3 <= focal <= 10:
-        return focal, ""
-    return None, (
-        f"focal: found '{text}'; expected the focal length over the length of the image's longer side, "
-        "0.3 to 10 (millimetres of a full-frame lens over 36), or nothing."
-    )
-
-
-def face_problem(numbers: Sequence[float]) -> str:
-    """What is wrong with the numbers that say which face is followed; empty where nothing is."""
-    if len(numbers) not in (0, 2, 4) or not all(math.isfinite(number) for number in numbers):
-        return (
-            f"face: found {len(numbers)} numbers; expected nothing (the largest), x, y (the nearest to "
-            "a point) or left, top, right, bottom (the largest in a box), in pixels."
-        )
-    if len(numbers) == 4 and not (numbers[0] < numbers[2] and numbers[1] < numbers[3]):
-        return "face: found an empty box; expected left < right and top < bottom."
-    return ""
-
-
 def _with_range(
     value: dict[str, str], numbers: dict[str, float], open_ends: list[str]
 ) -> tuple[dict[str, float], str]:
@@ -285,5 +260,14 @@ def _check_together(takes: list[Take]) -> list[str]:
             problems.append(
                 f"take {take.name}: found {len(plain)} `plain` takes of subject "
                 f"{take.subject}; expected one. Add a row for the frame without tattoo."
+            )
+    for subject in sorted({take.subject for take in takes}):
+        found = sorted(
+            {t.eye_distance_mm for t in takes if t.subject == subject and t.eye_distance_mm}
+        )
+        if len(found) > 1:
+            problems.append(
+                f"subject {subject}: found eye_distance_mm {' and '.join(f'{d:g}' for d in found)}; "
+                "expected one distance a person. Correct or empty one."
             )
     return problems

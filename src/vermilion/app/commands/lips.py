@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model", help="`generic`, or file of a trained regressor (models/<name>.h5 of a run)"
     )
     parser.add_argument("--scan", help="3D scan of the person: OBJ, PLY or STL")
+    parser.add_argument("--eye-distance", help="measured distance of the person's pupils, mm")
     parser.add_argument("--out", help="folder of the results; default results/lips/<clip>")
     parser.add_argument("--first", type=int, help="first frame; default the file's")
     parser.add_argument("--last", type=int, help="last frame; default the file's")
@@ -39,6 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.video,
         model=arguments.model,
         scan=arguments.scan,
+        eye_distance=arguments.eye_distance,
         out=arguments.out,
         span=(arguments.first, arguments.last),
         options=arguments.options,

@@ -9,7 +9,7 @@ from vermilion.app.run_files import PATHS, read_configuration, results_paths
 from vermilion.config.external_base import sequences_of
 from vermilion.config.guided import GuidedConfig
 from vermilion.config.root import Configuration
-from vermilion.config.takes import STUDIO, Take
+from vermilion.config.takes import STUDIO, Take, eye_distances
 from vermilion.imaging.source import Source, folder_of
 from vermilion.storage.errors import InputError
 
@@ -76,7 +76,7 @@ class TakeFiles:
             place = {"subject": take.subject, "take": take.take}
             return Path(pattern.format(**place, chunk="*", frame="*"))
 
-        own_tracker = take.subject in config.tracking.scans
+        own_tracker = take.subject in {*config.tracking.scans, *eye_distances(takes)}
         tracker = patterns.own_tracker if own_tracker else patterns.tracker
         if sequences_of(takes):
             tracker = config.tracking.external.base.model or patterns.external_model

@@ -1,0 +1,65 @@
+"""The size of a head from the distance of its pupils."""
+
+import numpy as np
+import pytest
+
+from tests.heads import small_tracker
+from vermilion.config.takes import eye_distances, read_takes
+from vermilion.storage.errors import InputError
+from vermilion.tracking.identity.head_size import pupil_distance_mm, sized_model
+
+HEADER = "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\teye_distance_mm\n"
+MODEL = small_tracker()
+
+
+def sheet(tmp_path, *distances):
+    path = tmp_path / "takes.tsv"
+    rows = [f"s\tt{k}\tvideo\tstudio\t0\t9\t25\tnone\t{d}\n" for k, d in enumerate(distances)]
+    path.write_text(HEADER + "".join(rows))
+    return read_takes(path)
+
+
+@pytest.mark.parametrize("wanted", [52.0, 63.0, 71.5])
+def test_a_person_has_the_measured_distance_and_nothing_but_the_size_changes(wanted):
+    person = np.random.default_rng(3).normal(size=MODEL.n_identities)
+    own = sized_model(MODEL, person, wanted)
+    assert pupil_distance_mm(own, own.neutral_of(person)) == pytest.approx(wanted, abs=1e-4)
+    weights = np.random.default_rng(4).uniform(size=MODEL.n_expressions)
+    before, after = MODEL.vertices(person, weights), own.vertices(person, weights)
+    scale = wanted / pupil_distance_mm(MODEL, MODEL.neutral_of(person))
+    assert np.allclose(after, scale * before, atol=1e-3)  # mm: nearer by as much, no image changes
+
+
+def test_pupils_lie_between_the_corners_of_the_eyes():
+    corners = MODEL.neutral_mm[MODEL.landmarks[[36, 39, 42, 45]]]
+    outer, inner = (np.linalg.norm(corners[a] - corners[b]) for a, b in ((0, 3), (1, 2)))
+    assert inner < pupil_distance_mm(MODEL, MODEL.neutral_mm) < outer
+
+
+def test_a_distance_in_centimetres_is_refused():
+    with pytest.raises(InputError, match="eye_distance_mm 31, where the face model has"):
+        sized_model(MODEL, np.zeros(MODEL.n_identities), 31.0)
+
+
+def test_one_row_tells_it_for_the_person(tmp_path):
+    takes, problems = sheet(tmp_path, "", "62.5")
+    assert not problems and eye_distances(takes) == {"s": 62.5}
+
+
+@pytest.mark.parametrize(
+    ("distances", "said"),
+    [
+        (
+            ("62", "64"),
+            "subject s: found eye_distance_mm 62 and 64; expected one distance a person",
+        ),
+        (
+            ("6.3",),
+            "eye_distance_mm: found '6.3'; expected the distance of the pupils in millimetres",
+        ),
+        (("wide",), "eye_distance_mm: found 'wide'; expected"),
+    ],
+)
+def test_what_is_no_distance_is_said(tmp_path, distances, said):
+    _, problems = sheet(tmp_path, *distances)
+    assert len(problems) == 1 and said in problems[0]
