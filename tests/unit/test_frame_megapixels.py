@@ -23,6 +23,13 @@ def test_of_the_studio_by_the_configuration(role, expected):
     assert megapixels("studio", role) == pytest.approx(expected)
 
 
+def test_of_a_take_with_images_of_its_own_size():
+    own = {"s1": {"takes": {"rom": {"video_size_px": (200, 100)}}}}
+    studio = STUDIO.model_copy(update={"subjects": StudioConfig(subjects=own).subjects})
+    take = Take("s1", "rom", "video", "studio", 0, 3, 30.0, "none")
+    assert frame_megapixels(take, studio) == pytest.approx([0.02])
+
+
 def test_of_a_capture_each_camera(tmp_path):
     for camera, shape in (("a", (200, 100)), ("b", (300, 400))):
         (tmp_path / "frames" / camera).mkdir(parents=True)

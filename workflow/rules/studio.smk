@@ -5,7 +5,7 @@ wants to know the names of outputs beforehand, there is one rule a take and chun
 `chunk` are read here, not from wildcards.
 """
 
-from vermilion.config.studio import StudioSubject, StudioTake
+from vermilion.config.studio import StudioSubject
 from vermilion.studio.label_frames import label_frames
 from vermilion.studio.rig import FRONTAL_PAIR, camera_names
 
@@ -30,7 +30,7 @@ STUDIO_CAMERA_KEYS = (
     "video_view_mm",
 )
 #: Those that a take may have of its own.
-STUDIO_OWN_CAMERA_KEYS = ("camera_distance_mm", "video_view_mm")
+STUDIO_OWN_CAMERA_KEYS = ("camera_distance_mm", "video_view_mm", "video_size_px")
 STUDIO_IMAGE_KEYS = (
     "occlusion_directions",
     "light_samples",
@@ -47,8 +47,7 @@ def studio_values(keys):
 
 def studio_performance(take):
     """How the take is performed: its section of the configuration, or the defaults."""
-    subject = CONFIG.studio.subjects.get(take.subject, StudioSubject())
-    return subject.takes.get(take.take, StudioTake())
+    return CONFIG.studio.take_of(take.subject, take.take)
 
 
 def studio_plan(take):

@@ -24,7 +24,7 @@ def frame_megapixels(
     if take.role == "tracked":
         return []
     if take.source == STUDIO:
-        sizes = _studio_sizes(take.role, studio)
+        sizes = _studio_sizes(take, studio)
     else:
         try:
             sizes = _sizes(Path(take.source), reading)
@@ -33,14 +33,15 @@ def frame_megapixels(
     return [width * height / 1e6 for width, height in sizes]
 
 
-def _studio_sizes(role: str, studio: StudioConfig) -> list[tuple[int, int]]:
+def _studio_sizes(take: Take, studio: StudioConfig) -> list[tuple[int, int]]:
     """(width, height) of each camera of a synthetic take."""
+    video = studio.take_of(take.subject, take.take).video_size_px or studio.video_size_px
     of_group = {
         **dict.fromkeys(FACE_ANGLES_DEG, studio.face_size_px),
         **dict.fromkeys(LIP_ANGLES_DEG, studio.lip_size_px),
-        **dict.fromkeys(VIDEO_CAMERAS, studio.video_size_px),
+        **dict.fromkeys(VIDEO_CAMERAS, video),
     }
-    return [of_group[name] for name in camera_names(role, studio.cameras)]
+    return [of_group[name] for name in camera_names(take.role, studio.cameras)]
 
 
 def _sizes(source: Path, reading: ImageReading) -> list[tuple[int, int]]:

@@ -62,6 +62,10 @@ class StudioTake(StageConfig):
         le=1000,
         description="Height that the video camera sees at the face (mm); empty: that of all takes.",
     )
+    video_size_px: tuple[int, int] | None = Field(
+        None,
+        description="Width and height of the take's images, of `video` takes only (px); empty: those of all takes.",
+    )
     lights: Literal["rig", "room", "window"] = Field(
         "rig",
         description="`rig`: even light of a capture rig. `room`: lamps above and at one side. "
@@ -186,6 +190,12 @@ class StudioConfig(StageConfig):
         6, ge=0, le=1000, description="Labelled contour frames of a take (frames)."
     )
     seed: int = Field(0, ge=0, description="Seed that is combined with all other seeds.")
+
+    def take_of(self, subject: str, take: str) -> StudioTake:
+        """How a take is performed: its section, or the defaults."""
+        actor = self.subjects.get(subject)
+        own = None if actor is None else actor.takes.get(take)
+        return StudioTake.model_validate({}) if own is None else own
 
     @model_validator(mode="after")
     def _check_cameras(self) -> StudioConfig:
