@@ -27,10 +27,10 @@ LEAST_FRAMES = 6
 #: Of the robust line: its rounds, its least spread, and from how many spreads on a frame hardly counts.
 ROUNDS, LEAST_SPREAD, FAR = 20, 0.005, 1.5
 COLUMN_PRIOR = 2.0  # frames that speak for the same offset in all columns
-FACTOR_PRIOR = 0.005  # height changes of landmarks by less tell no factor, per inter-ocular distance
+FACTOR_PRIOR = 0.005  # smaller changes of the landmarks' height tell no factor
 #: A lip higher or lower by so much costs as a border one reach from its start: per inter-ocular distance.
 USUAL = 0.015
-FACTOR_ERROR = 0.35  # of the factor: where landmarks see lips unlike the take's, less is told
+FACTOR_ERROR = 0.5  # of the factor: where landmarks see lips unlike the take's, less is told
 MOST = 3.0  # deviations from which on the cost grows linearly
 
 
