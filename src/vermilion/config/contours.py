@@ -142,6 +142,13 @@ class ContourDetectorConfig(StageConfig):
         "mouth's inside in all frames of the take count for the inner border, against those of the frame "
         "alone (share); 0 does not learn them.",
     )
+    lips_heights: float = Field(
+        1.0,
+        ge=0,
+        le=10,
+        description="`track`, where the lips of dense landmarks are the start: weight of the heights that the lips "
+        "have in the other frames of the take against edges in this one; 0 does not learn them.",
+    )
     edge_weight: float = Field(
         4.0,
         ge=0,

@@ -72,6 +72,13 @@ def sampled(plane: np.ndarray, points: np.ndarray) -> np.ndarray:
     return sample_bilinear(plane, points).astype(np.float64)
 
 
+def of_halves(planes: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Values (n, m) at points (n, m, 2) beside a curve: of `planes` (2, h, w) the first for its first half."""
+    half = len(points) // 2
+    parts = zip(planes, (points[:half], points[half:]), strict=True)
+    return np.concatenate([sampled(plane, part) for plane, part in parts])
+
+
 def inward_normals(ring: np.ndarray, apart: int = 1) -> np.ndarray:
     """Unit normals, as the closed ring (n, 2 or 3), towards its inside in the plane of x and y.
 

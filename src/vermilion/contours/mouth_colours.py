@@ -18,11 +18,13 @@ from scipy.spatial import cKDTree
 from vermilion.contours.curves import (
     distance_across,
     inside_and_distance,
+    of_halves,
     outward_normals,
     sampled,
     smoothed_ring,
 )
 from vermilion.contours.gums import creases
+from vermilion.contours.lip_heights import held_back
 from vermilion.contours.paths import cheapest_ring, step_cost
 
 #: Cells of the table along lightness, redness and yellowness per lightness, and what they span.
@@ -122,6 +124,7 @@ def to_colours(
     planes: tuple[np.ndarray, np.ndarray, np.ndarray],
     interocular_px: float,
     step_px: float,
+    unusual: np.ndarray | None = None,
 ) -> np.ndarray:
     """The inner border's `curve` (n, 2) moved to where lip and mouth part best, less `SLACK_PX`.
 
@@ -131,16 +134,15 @@ def to_colours(
             behind a crease is gums, whose colour is a lip's.
         interocular_px: inter-ocular distance in the region.
         step_px: between the places of the search.
+        unusual: (2, size, size), what an unusual height of either lip costs, as of
+            `lip_heights.unusual_heights`.
     """
     normals, across = outward_normals(curve), distance_across(curve)
     inwards, outwards = (int(share * interocular_px / step_px) for share in REACH)
     places = step_px * np.arange(-inwards, outwards + 1)
     points = curve[:, None] + places[None, :, None] * normals[:, None]
     light, flesh, lip = (sampled(plane, points) for plane in planes)
-    half = len(curve) // 2
-    seen = np.concatenate([
-        sampled(plane, part) for plane, part in zip(odds, (points[:half], points[half:]), strict=True)
-    ])  # fmt: skip
+    seen = of_halves(odds, points)
     if (lips := (lip > 0.5) & (flesh > 0.5)).any():
         shade = (places > 0) & (light < SHADE * np.median(light[lips]))
         seen = np.where(shade, np.maximum(seen, 0.0), seen)
@@ -151,6 +153,8 @@ def to_colours(
     cost = (
         ODDS_WEIGHT * step_px * np.cumsum(seen, axis=1) + (places / (USUAL * interocular_px)) ** 2
     )
+    if unusual is not None:
+        cost += held_back(unusual, points, places)
     cost[beyond_middle | ((lip < 0.5) & (places > 0))] = 1e3
     moved = places[cheapest_ring(cost, step_cost(curve, step_px, STIFFNESS))]
     moved = np.sign(moved) * np.maximum(np.abs(moved) - SLACK_PX, 0.0)

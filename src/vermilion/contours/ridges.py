@@ -17,6 +17,7 @@ from vermilion.contours.channels import colour_channels
 from vermilion.contours.curves import (
     distance_across,
     inside_of,
+    of_halves,
     outward_normals,
     sampled,
     smoothed_ring,
@@ -24,6 +25,7 @@ from vermilion.contours.curves import (
 from vermilion.contours.detector import ContourDetector
 from vermilion.contours.gums import creases
 from vermilion.contours.holes import hole_edges
+from vermilion.contours.lip_heights import held_back
 from vermilion.contours.lip_planes import dark_lines, lip_planes
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion
@@ -84,6 +86,7 @@ class InnerCues:
         flesh: where the image is lips, gums or tongue, 0 or 1.
         lip: 1 inside the outer border.
         teeth: 1 on teeth: light places without the lips' colour.
+        unusual: (2, size, size), what an unusual height of the upper and the lower lip costs; None: not known.
     """
 
     lightness: np.ndarray
@@ -91,6 +94,7 @@ class InnerCues:
     flesh: np.ndarray
     lip: np.ndarray
     teeth: np.ndarray
+    unusual: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,8 @@ class RidgeDetector(ContourDetector):
             crease, beyond = self._creases(curve, normals, inside, step_px, count)
             fall += (1.0 - near) * (crease - beyond * fall)
         cost = (places / reach_px) ** 2 - self.edge_weight * fall
+        if inside is not None and inside.unusual is not None:
+            cost += of_halves(inside.unusual, points)
         chosen = cheapest_ring(cost, step_cost(curve, step_px, self.stiffness))
         rows = np.arange(len(curve))
         found = smoothed_ring(curve + places[chosen][:, None] * normals, 2)
@@ -201,6 +207,8 @@ class RidgeDetector(ContourDetector):
             + (1 - sure[:, None]) * (places / (self.reach * size)) ** 2
             - self.edge_weight * line
         )
+        if inside.unusual is not None:
+            cost += held_back(inside.unusual, points, places)
         across = np.maximum(distance_across(curve), self.reach * size)
         cost[-places[None] > across[:, None]] = 1e3
         chosen = cheapest_ring(cost, step_cost(curve, step_px, HOLE_STIFFNESS))

@@ -23,6 +23,12 @@ from vermilion.contours.curves import (
     smoothed_ring,
     without_crossing,
 )
+from vermilion.contours.lip_heights import (
+    learn_lip_heights,
+    lip_heights,
+    seen_heights,
+    unusual_heights,
+)
 from vermilion.contours.lip_planes import BESIDE
 from vermilion.contours.mouth_colours import learn_lip_odds, lip_odds, not_lip, to_colours
 from vermilion.contours.outer_edges import (
@@ -58,6 +64,8 @@ class TrackRidgeDetector(RidgeDetector):
         inner_offset: (m,) as `outer_offset`, of the inner border.
         lips_colours: what the take's colours count for the inner border, against those of a frame.
         lip_odds: (2, C, C, C) these colours, as of `learn_lip_odds`; (0,): not known.
+        lips_heights: what an unusual height of a lip costs, against an edge.
+        usual_heights: (2, K, 3) what tells the lips' heights, as of `learn_lip_heights`; (0,): not known.
     """
 
     kind = "track"
@@ -72,6 +80,8 @@ class TrackRidgeDetector(RidgeDetector):
     inner_offset: np.ndarray = field(default_factory=lambda: np.zeros(0))
     lips_colours: float = 0.5
     lip_odds: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    lips_heights: float = 1.0
+    usual_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
@@ -141,13 +151,16 @@ class TrackRidgeDetector(RidgeDetector):
         if odds is not None:
             reach *= COLOURS_REACH
         start, strength = curve, np.zeros(len(curve))
+        unusual = None
+        if len(self.usual_heights):
+            unusual = self.lips_heights * unusual_heights(self.usual_heights, region, outer, size)
         for search in SEARCHES:
             cues, strange = inner_cues(colours, outer, curve, search)
             if search is SEARCHES[0]:
-                start = self.to_holes(curve, cues, search.step_px)
+                start = self.to_holes(curve, replace(cues, unusual=unusual), search.step_px)
                 if odds is not None:
                     planes = cues.lightness, cues.flesh, cues.lip
-                    start = to_colours(start, odds, planes, size, search.step_px)
+                    start = to_colours(start, odds, planes, size, search.step_px, unusual)
                 curve = start
                 cues, strange = inner_cues(colours, outer, curve, search)
             if odds is not None:
@@ -157,7 +170,7 @@ class TrackRidgeDetector(RidgeDetector):
                 strange,
                 search.inner_reach * reach,
                 search.step_px,
-                cues,
+                replace(cues, unusual=unusual),
             )
         return without_crossing(curve), strength
 
@@ -261,9 +274,14 @@ def _learn_inner(
         return [detector.inner_border(*frame)[0] for frame in frames]
 
     if not off_by_the_same:
-        if not detector.lips_colours:
-            return detector
-        return replace(detector, lip_odds=learn_lip_odds(colours, outer, borders(), size))
+        if detector.lips_colours:
+            odds = learn_lip_odds(colours, outer, borders(), size)
+            detector = replace(detector, lip_odds=odds)
+        if detector.lips_heights:
+            seen = [seen_heights(region) / size for region in regions]
+            found = [lip_heights(*pair) / size for pair in zip(borders(), outer, strict=True)]
+            detector = replace(detector, usual_heights=learn_lip_heights(seen, found))
+        return detector
     tracked = [loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES)) for region in regions]
     for _ in range(INNER_ROUNDS):
         moved = [

@@ -45,6 +45,7 @@ def from_track(cfg, camera, source, track, rings, dense):
     detector = TrackRidgeDetector.of(
         cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach,
         lips_shade=cfg.lips_shade if dense else 0.0, lips_colours=cfg.lips_colours,
+        lips_heights=cfg.lips_heights,
     )  # fmt: skip
     return learn_from_take(
         detector,
