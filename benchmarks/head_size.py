@@ -16,7 +16,6 @@ landmarks but the jaw's, after a similarity alignment): mean absolute value and 
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
 
 import numpy as np
 
@@ -72,8 +71,7 @@ def _row(name: str, share: float | None, left: np.ndarray) -> dict[str, object]:
 def tracker_of(name: str, path: str | None, **changes: int) -> FaceModel:
     """The face model of the tracker by the configuration's defaults, with some values changed."""
     config = FaceModelConfig.model_validate({"name": name, "path": path, **changes})
-    values = {field.name: getattr(config, field.name) for field in fields(FaceModelSettings)}
-    return build_tracker(config.name, config.path, FaceModelSettings(**values))
+    return build_tracker(config.name, config.path, FaceModelSettings.of(config.model_dump()))
 
 
 def found_size(people: FaceModel, tracker: FaceModel, seed: int) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from vermilion.app.lips import correct_lips, expected
 from vermilion.config.load import load_configuration
 from vermilion.config.regressors import generic_file
 from vermilion.config.studio import StudioConfig
+from vermilion.config.takes import eye_distances, read_takes
 from vermilion.faces.build import TRACKER_TOPOLOGIES, face_model_of
 from vermilion.imaging.images import write_srgb8
 from vermilion.imaging.video import write_video
@@ -124,6 +125,29 @@ def test_what_is_no_video_stops_before_anything_is_fetched(
             options=[],
         )  # fmt: skip
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("eyes", "scan", "said"),
+    [("6.3", None, "EYES: found '6.3'"), ("63", __file__, "Give SCAN or EYES, not both")],
+)
+def test_a_size_that_cannot_be_is_told_before_anything_is_fetched(
+    clip, tmp_path, monkeypatch, eyes, scan, said
+):
+    monkeypatch.setattr("vermilion.app.lips.face_model", lambda **_: pytest.fail("fetched"))
+    with pytest.raises(VermilionError, match=said):
+        correct_lips(
+            str(clip), model=None, scan=scan, eye_distance=eyes, out=str(tmp_path / "out"),
+            span=(None, None), options=[],
+        )  # fmt: skip
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_measured_person_stands_in_the_sheet(clip, tmp_path):
+    shot = LipShot(clip, str(tmp_path / "out"), {"name": "procedural"}, eye_distance_mm=61.5)
+    write_shot(shot)
+    takes, problems = read_takes(tmp_path / "out" / "takes.tsv")
+    assert not problems and eye_distances(takes) == {"face": 61.5}
 
 
 def test_the_generic_regressor_needs_ict_facekit(clip, tmp_path, monkeypatch):

@@ -46,6 +46,9 @@ def test_a_smaller_rig_has_the_same_cameras_where_they_were(face, cameras):
 
 def test_the_configuration_names_the_cameras_of_the_rig():
     assert tuple(StudioConfig().cameras) == rig.MULTIVIEW_CAMERAS
+    for name in rig.FRONTAL_PAIR:
+        with pytest.raises(ValidationError, match=f"lacks {name}"):
+            StudioConfig(cameras=[other for other in rig.MULTIVIEW_CAMERAS if other != name])
     with pytest.raises(ValidationError, match="cameras lacks face3 of the frontal pair"):
         StudioConfig(cameras=["face2", "lip0"])
     with pytest.raises(ValidationError, match="twice: face2, face3, face2"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 
 from vermilion.app.face_files import ICT, REMEDY, VARIABLE, ModelChoice
@@ -38,7 +37,5 @@ def check_regressor(path: Path, face: ModelChoice) -> None:
 def _topology(face: ModelChoice) -> str:
     """`topology_hash` of the tracker that the workflow builds of a face model."""
     config = FaceModelConfig.model_validate(face.section)
-    settings = FaceModelSettings(
-        **{key.name: getattr(config, key.name) for key in fields(FaceModelSettings)}
-    )
+    settings = FaceModelSettings.of(config.model_dump())
     return topology_hash(build_tracker(config.name, config.path, settings).triangles)

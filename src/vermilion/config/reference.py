@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from vermilion.config.root import Configuration
 from vermilion.config.sheet_cells import COLUMNS
+from vermilion.config.sheet_numbers import EYE_DISTANCE_MM
 from vermilion.config.takes import SPLIT
 from vermilion.storage.files import atomic_path
 
@@ -63,7 +64,10 @@ def take_sheet_schema() -> dict[str, Any]:
             "be left out.",
         },
         "eye_distance_mm": {
-            "anyOf": [{"type": "number", "minimum": 30, "maximum": 100}, {"const": ""}],
+            "anyOf": [
+                {"type": "number", "minimum": EYE_DISTANCE_MM[0], "maximum": EYE_DISTANCE_MM[1]},
+                {"const": ""},
+            ],
             "description": "Measured distance of the subject's pupils, looking far ahead (mm), in one row of "
             "theirs: one camera does not tell how large a head is. Empty: the size is the face model's. The "
             "column may be left out.",

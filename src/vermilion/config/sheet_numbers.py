@@ -6,6 +6,9 @@ import contextlib
 import math
 from collections.abc import Sequence
 
+#: Distances of pupils that people have (mm), with room on either side.
+EYE_DISTANCE_MM = (30.0, 100.0)
+
 
 def face_of(text: str) -> tuple[tuple[float, ...], str]:
     """The numbers of the column `face`, and a sentence where they are none."""
@@ -41,11 +44,11 @@ def eye_distance_of(text: str) -> tuple[float | None, str]:
 def eye_distance_problem(text: str) -> str:
     """What is wrong with a measured distance of the pupils; empty where nothing is."""
     with contextlib.suppress(ValueError):
-        if 30 <= float(text) <= 100:
+        if EYE_DISTANCE_MM[0] <= float(text) <= EYE_DISTANCE_MM[1]:
             return ""
     return (
-        f"found '{text}'; expected the distance of the pupils in millimetres, 30 to 100 "
-        "(grown-ups 54 to 74)."
+        f"found '{text}'; expected the distance of the pupils in millimetres, {EYE_DISTANCE_MM[0]:g} to "
+        f"{EYE_DISTANCE_MM[1]:g} (adults 54 to 74)."
     )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from vermilion.faces.model import FaceModel
 from vermilion.storage.errors import InputError
@@ -38,6 +39,11 @@ class FaceModelSettings:
     studio_spacing_mm: float
     template_spacing_mm: float
     seed: int
+
+    @classmethod
+    def of(cls, section: Mapping[str, Any]) -> FaceModelSettings:
+        """From the values of the section `face_model`, which has other keys as well."""
+        return cls(**{key.name: section[key.name] for key in fields(cls)})
 
 
 def face_model_of(topology: str) -> str | None:

@@ -1,7 +1,5 @@
 """The configured face model as studio, template and tracker."""
 
-from dataclasses import fields
-
 from vermilion.faces.build import FaceModelSettings, build_models
 from vermilion.provenance.begun_run import begin_job
 
@@ -9,7 +7,7 @@ if __name__ == "__main__":
     begin_job(snakemake.log[0], __file__, snakemake.params.code)
     cfg = snakemake.params.cfg["face_model"]
     source = snakemake.input.get("source")
-    settings = FaceModelSettings(**{key.name: cfg[key.name] for key in fields(FaceModelSettings)})
+    settings = FaceModelSettings.of(cfg)
     source = source[0] if isinstance(source, list) and source else source
     models = build_models(cfg["name"], source, cfg["sha256"], settings)
     for part, model in models.items():
