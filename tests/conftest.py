@@ -13,14 +13,51 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import pytest  # noqa: E402
 
-# A process of tests holds many modules and items that never go: less often looked through for garbage.
+# A process of tests holds many modules and items that never go: less often looked through for garbage,
+# and not at all before they are collected.
 gc.set_threshold(50_000)
+gc.disable()
 
 ROOT = Path(__file__).resolve().parents[1]
 #: The file that makes the tiny run begins. Files that wait for that run come last, the longest of them first;
 #: a process with one or two tests left takes a further file at once: two long single tests do not stand together.
 _BEGIN = "test_faults"
 _LONG = ("test_chunks", "test_guided", "test_failed_takes", "test_reruns")
+#: Files that one process takes together: what they make once a process, the other one need not make too.
+_TOGETHER = {
+    "tests/unit/inpaint/": "lip patch",
+    "tests/unit/sketch_page/": "sketch page",
+    "tests/unit/test_architecture.py": "syntax",
+    "tests/unit/test_defaults_once.py": "syntax",
+    "tests/unit/test_no_code_in_files.py": "syntax",
+    "tests/unit/test_procedural": "generated heads",
+    "tests/unit/test_lips.py": "generated heads",
+    "tests/unit/test_rig.py": "generated heads",
+    "tests/unit/test_visible_opening.py": "generated heads",
+}
+
+
+def pytest_configure(config):
+    """Hypothesis would read the syntax of all modules for constants, in each process: the drawn values do."""
+    from hypothesis.internal.conjecture import providers
+
+    if hasattr(providers, "_get_local_constants"):
+        providers._get_local_constants = providers.Constants
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """As `--dist loadfile`, but with the files of `_TOGETHER` in one piece."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            together = (name for start, name in _TOGETHER.items() if nodeid.startswith(start))
+            return next(together, None) or super()._split_scope(nodeid)
+
+    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(items):
@@ -40,6 +77,7 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     gc.freeze()
+    gc.enable()
     atexit.register(gc.unfreeze)  # not before: all would be looked through twice
 
 
