@@ -23,26 +23,27 @@ ROOT = Path(__file__).resolve().parents[1]
 #: a process with one or two tests left takes a further file at once: two long single tests do not stand together.
 _BEGIN = "test_faults"
 _LONG = ("test_chunks", "test_guided", "test_failed_takes", "test_reruns")
-#: Files that one process takes together: what they make once a process, the other one need not make too.
+#: Beginnings of files of tests/unit that one process takes together: what they make once a process, another
+#: one need not make too.
 _TOGETHER = {
-    "tests/unit/inpaint/": "lip patch",
-    "tests/unit/sketch_page/": "sketch page",
-    "tests/unit/test_architecture.py": "syntax",
-    "tests/unit/test_defaults_once.py": "syntax",
-    "tests/unit/test_no_code_in_files.py": "syntax",
-    "tests/unit/test_procedural": "generated heads",
-    "tests/unit/test_lips.py": "generated heads",
-    "tests/unit/test_rig.py": "generated heads",
-    "tests/unit/test_visible_opening.py": "generated heads",
+    "lip patch": ("inpaint/",),
+    "sketch page": ("sketch_page/",),
+    "syntax": ("test_architecture.py", "test_defaults_once.py", "test_no_code_in_files.py"),
+    "large heads": ("test_ict.py", "test_procedural", "test_rig.py", "test_visible_opening.py"),
+    "small heads": (
+        *("test_evaluation_contour.py", "test_evaluation_kinds.py", "test_external_topology.py"),
+        *("test_fast_motion.py", "test_gradient_sums.py", "test_half_profile.py"),
+        *("test_head_size.py", "test_lips.py", "test_occluding.py", "test_own_"),
+        *("test_scan.py", "test_tracking_own_lips.py", "test_unseen_subject.py"),
+    ),
 }
 
 
 def pytest_configure(config):
-    """Hypothesis would read the syntax of all modules for constants, in each process: the drawn values do."""
-    from hypothesis.internal.conjecture import providers
-
-    if hasattr(providers, "_get_local_constants"):
-        providers._get_local_constants = providers.Constants
+    """A worker that has reported all its tests ends without taking apart what they loaded."""
+    if hasattr(config, "workerinput"):
+        worker = os.getpid()
+        atexit.register(lambda: os._exit(0) if os.getpid() == worker else None)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -54,7 +55,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     class Scheduling(LoadFileScheduling):
         def _split_scope(self, nodeid):
-            together = (name for start, name in _TOGETHER.items() if nodeid.startswith(start))
+            place = nodeid.removeprefix("tests/unit/")
+            together = (name for name, starts in _TOGETHER.items() if place.startswith(starts))
             return next(together, None) or super()._split_scope(nodeid)
 
     return Scheduling(config, log)

@@ -40,7 +40,9 @@ def test_the_person_found_in_landmarks_has_the_measured_distance():
     cfg = TrackingConfig().model_dump(mode="json")
     settings = identity_settings(cfg["fit"], cfg["identity"])
     video = [seen(small_tracker(), small_tracker().neutral_mm, settings, np.random.default_rng(5))]
-    own = sized_model(small_tracker(), fit_identity(small_tracker(), video, settings).identity, 70.0)
+    own = sized_model(
+        small_tracker(), fit_identity(small_tracker(), video, settings).identity, 70.0
+    )
     found = own.neutral_of(fit_identity(own, video, settings).identity)
     assert pupil_distance_mm(own, found) == pytest.approx(70.0, abs=0.3)  # mm
 
