@@ -23,43 +23,6 @@ ROOT = Path(__file__).resolve().parents[1]
 #: a process with one or two tests left takes a further file at once: two long single tests do not stand together.
 _BEGIN = "test_faults"
 _LONG = ("test_chunks", "test_guided", "test_failed_takes", "test_reruns")
-#: Beginnings of files of tests/unit that one process takes together: what they make once a process, another
-#: one need not make too.
-_TOGETHER = {
-    "lip patch": ("inpaint/",),
-    "sketch page": ("sketch_page/",),
-    "syntax": ("test_architecture.py", "test_defaults_once.py", "test_no_code_in_files.py"),
-    "large heads": ("test_ict.py", "test_procedural", "test_rig.py", "test_visible_opening.py"),
-    "small heads": (
-        *("test_evaluation_contour.py", "test_evaluation_kinds.py", "test_external_topology.py"),
-        *("test_fast_motion.py", "test_gradient_sums.py", "test_half_profile.py"),
-        *("test_head_size.py", "test_lips.py", "test_occluding.py", "test_own_"),
-        *("test_scan.py", "test_tracking_own_lips.py", "test_unseen_subject.py"),
-    ),
-}
-
-
-def pytest_configure(config):
-    """A worker that has reported all its tests ends without taking apart what they loaded."""
-    if hasattr(config, "workerinput"):
-        worker = os.getpid()
-        atexit.register(lambda: os._exit(0) if os.getpid() == worker else None)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """As `--dist loadfile`, but with the files of `_TOGETHER` in one piece."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadFileScheduling
-
-    class Scheduling(LoadFileScheduling):
-        def _split_scope(self, nodeid):
-            place = nodeid.removeprefix("tests/unit/")
-            together = (name for name, starts in _TOGETHER.items() if place.startswith(starts))
-            return next(together, None) or super()._split_scope(nodeid)
-
-    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(items):
