@@ -65,9 +65,9 @@ def moved(mesh, landmarks, scale=1.0, turn=(0, 0, 0), shift=(0, 0, 0)):
     return mesh.with_vertices(place[0]), ScanLandmarks(place[1], np.zeros(66))
 
 
-def fitted(generic, cut=as_scan, **move):
+def fitted(generic, **move):
     truth = person(generic)
-    scan = cut(truth, generic.triangles)
+    scan = as_scan(truth, generic.triangles)
     return truth, personal_model(generic, *moved(scan, truth[generic.landmarks], **move))
 
 
@@ -124,8 +124,8 @@ def test_expressions_of_the_person_are_those_of_the_model_but_for_the_shape(gene
 
 def test_a_moved_turned_and_scaled_scan_gives_the_same_model(generic):
     """In units that are none: that of a standard unit is kept."""
-    _, still = fitted(generic, Mesh, scale=0.37)
-    _, away = fitted(generic, Mesh, scale=0.013, turn=(70, -130, 20), shift=(3, 9, -20))
+    _, still = fitted(generic, scale=0.37)
+    _, away = fitted(generic, scale=0.013, turn=(70, -130, 20), shift=(3, 9, -20))
     share = away.fit.head_from_scan.scale / still.fit.head_from_scan.scale
     assert share == pytest.approx(0.37 / 0.013, rel=1e-6)
     np.testing.assert_allclose(away.model.neutral_mm, still.model.neutral_mm, atol=1e-3)
