@@ -13,8 +13,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import pytest  # noqa: E402
 
-# A process of tests holds many modules and items that never go: less often looked through for garbage.
+# A process of tests holds many modules and items that never go: less often looked through for garbage,
+# and not at all before they are collected.
 gc.set_threshold(50_000)
+gc.disable()
 
 ROOT = Path(__file__).resolve().parents[1]
 #: The file that makes the tiny run begins. Files that wait for that run come last, the longest of them first;
@@ -40,6 +42,7 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     gc.freeze()
+    gc.enable()
     atexit.register(gc.unfreeze)  # not before: all would be looked through twice
 
 

@@ -35,7 +35,7 @@ RAYS = {"occlusion_directions": 32, "light_samples": 2}
 
 @pytest.fixture(scope="module")
 def model():
-    return studio_model(spacing_mm=1.6)
+    return studio_model(spacing_mm=2.4)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from vermilion.tracking.result import Identity, TrackedTake
 from vermilion.tracking.settings import LandmarkFitSettings
 
 SIDE = 41
-CAMERA = pinhole("cam", 1200.0, 480, 480)
+CAMERA = pinhole("cam", 1200.0, 360, 360)
 LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2], LIGHT[3] = 0.8, -0.25, -0.35, 0.2
 FACING = np.diag([1.0, -1.0, -1.0])  # head to camera: y up to y down

@@ -92,7 +92,7 @@ def test_saved_detector_answers_the_same(detector, tmp_path):
 def test_training_is_repeatable(detector, tmp_path):
     frames = [LabelledFrame(*draw_mouth(6.0, 24.0, seed=1), 1)]
     small = ContourTrainingSettings(
-        n_features=100, variants=2, max_samples=2000, boosting=BoostingSettings(n_trees=8)
+        n_features=50, variants=2, max_samples=500, boosting=BoostingSettings(n_trees=4)
     )
     for name in ("a", "b"):
         train_detector(frames, small, seed=3).save(tmp_path / name)

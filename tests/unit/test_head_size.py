@@ -15,7 +15,6 @@ from vermilion.tracking.identity.landmark_identity import fit_identity
 from vermilion.tracking.settings import identity_settings
 
 HEADER = "subject\ttake\trole\tsource\tfirst\tlast\tfps\tsplit\teye_distance_mm\n"
-MODEL = small_tracker()
 
 
 def sheet(tmp_path, *distances):
@@ -27,12 +26,12 @@ def sheet(tmp_path, *distances):
 
 @pytest.mark.parametrize("wanted", [52.0, 63.0, 71.5])
 def test_a_person_has_the_measured_distance_and_nothing_but_the_size_changes(wanted):
-    person = np.random.default_rng(3).normal(size=MODEL.n_identities)
-    own = sized_model(MODEL, person, wanted)
+    person = np.random.default_rng(3).normal(size=small_tracker().n_identities)
+    own = sized_model(small_tracker(), person, wanted)
     assert pupil_distance_mm(own, own.neutral_of(person)) == pytest.approx(wanted, abs=1e-4)
-    weights = np.random.default_rng(4).uniform(size=MODEL.n_expressions)
-    before, after = MODEL.vertices(person, weights), own.vertices(person, weights)
-    scale = wanted / pupil_distance_mm(MODEL, MODEL.neutral_of(person))
+    weights = np.random.default_rng(4).uniform(size=small_tracker().n_expressions)
+    before, after = small_tracker().vertices(person, weights), own.vertices(person, weights)
+    scale = wanted / pupil_distance_mm(small_tracker(), small_tracker().neutral_of(person))
     assert np.allclose(after, scale * before, atol=1e-3)  # mm: nearer by as much, no image changes
 
 
@@ -40,21 +39,23 @@ def test_the_person_found_in_landmarks_has_the_measured_distance():
     """Landmarks tell no size: fitted again in the face model of their size, the person has it."""
     cfg = TrackingConfig().model_dump(mode="json")
     settings = identity_settings(cfg["fit"], cfg["identity"])
-    video = [seen(MODEL, MODEL.neutral_mm, settings, np.random.default_rng(5))]
-    own = sized_model(MODEL, fit_identity(MODEL, video, settings).identity, 70.0)
+    video = [seen(small_tracker(), small_tracker().neutral_mm, settings, np.random.default_rng(5))]
+    own = sized_model(
+        small_tracker(), fit_identity(small_tracker(), video, settings).identity, 70.0
+    )
     found = own.neutral_of(fit_identity(own, video, settings).identity)
     assert pupil_distance_mm(own, found) == pytest.approx(70.0, abs=0.3)  # mm
 
 
 def test_pupils_lie_between_the_corners_of_the_eyes():
-    corners = MODEL.neutral_mm[MODEL.landmarks[[36, 39, 42, 45]]]
+    corners = small_tracker().neutral_mm[small_tracker().landmarks[[36, 39, 42, 45]]]
     outer, inner = (np.linalg.norm(corners[a] - corners[b]) for a, b in ((0, 3), (1, 2)))
-    assert inner < pupil_distance_mm(MODEL, MODEL.neutral_mm) < outer
+    assert inner < pupil_distance_mm(small_tracker(), small_tracker().neutral_mm) < outer
 
 
 def test_a_distance_in_centimetres_is_refused():
     with pytest.raises(InputError, match="eye_distance_mm 31, where the face model has"):
-        sized_model(MODEL, np.zeros(MODEL.n_identities), 31.0)
+        sized_model(small_tracker(), np.zeros(small_tracker().n_identities), 31.0)
 
 
 def test_one_row_tells_it_for_the_person(tmp_path):

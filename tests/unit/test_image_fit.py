@@ -184,9 +184,10 @@ def test_each_piece_is_fitted_under_its_own_light(scene, images, tmp_path):
         and (Appearance.load(tmp_path / "a.npz").light == read[1].light).all()
     )
     problems = {k: FrameProblem(face, found, SETTINGS, 0.5) for k, found in read.items()}
-    everything, piece = np.ones(N_FRAMES, dtype=bool), np.ones(N_FRAMES, dtype=np.int64)
-    chunk = FrameChunk(start, everything, wrong, face, lambda row: images[row], 1.0, piece)
+    first, piece = np.arange(N_FRAMES) < 2, np.ones(N_FRAMES, dtype=np.int64)
+    chunk = FrameChunk(start, first, wrong, face, lambda row: images[row], 1.0, piece)
     alone = fit_frames(replace(chunk, piece=None), problems[1])
+    assert np.array_equal(alone["refined"], first)
     assert np.array_equal(fit_frames(chunk, problems)["x"], alone["x"])
 
 

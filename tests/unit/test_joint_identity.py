@@ -86,9 +86,9 @@ def test_every_frame_is_explained_better(fitted):
 def test_a_step_goes_downhill_all_the_way():
     model, problem, images = scene()
     frames, shared = problem.solve()
-    settings = IdentityImageSettings(spacing_mm=4.0, pixel_mm=2.0, strength=300.0)
+    settings = IdentityImageSettings(spacing_mm=5.0, pixel_mm=2.0, strength=300.0)
     held = _JointProblem(
-        model, problem, sample_skin(model, 4.0), images, [CAMERA] * N_FRAMES, settings, frames,
+        model, problem, sample_skin(model, 5.0), images, [CAMERA] * N_FRAMES, settings, frames,
         shared,
     )  # fmt: skip
     step_frames, step_shared = held.newton_step(frames, shared)
@@ -102,6 +102,6 @@ def test_a_step_goes_downhill_all_the_way():
 def test_no_weight_of_the_images_is_the_landmark_fit():
     model, problem, images = scene()
     plain = problem.result(*problem.solve())
-    off = IdentityImageSettings(strength=0.0, rounds=1)
+    off = IdentityImageSettings(spacing_mm=5.0, pixel_mm=2.0, strength=0.0, rounds=1)
     joint = fit_joint_identity(model, problem, images, [CAMERA] * N_FRAMES, off)
     assert np.abs(joint.person.identity - plain.identity).max() < 0.02

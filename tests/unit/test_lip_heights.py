@@ -49,8 +49,8 @@ def frame(opening, shaded_teeth=False, seed=0):
     return image, landmarks, (ellipse(CENTRE, WIDTH, height, 80), inner), border
 
 
-def learnt(share=1.0, openings=OPENINGS):
-    detector = TrackRidgeDetector(reach=0.02, lips_heights=share)
+def learnt(share=1.0, openings=OPENINGS, **others):
+    detector = TrackRidgeDetector(reach=0.02, lips_heights=share, **others)
     images, regions = [], []
     for seed, opening in enumerate(openings):
         image, landmarks, rings, _ = frame(opening, seed=seed)
@@ -135,8 +135,10 @@ def test_the_told_height_costs_nothing_and_corners_are_not_told(detector):
 
 
 def test_few_frames_and_weight_0_learn_nothing():
-    assert len(learnt(openings=OPENINGS[: LEAST_FRAMES - 1]).usual_heights) == 0
-    assert len(learnt(share=0.0).usual_heights) == 0
+    for options in ({"openings": OPENINGS[: LEAST_FRAMES - 1]}, {"share": 0.0}):
+        assert len(learnt(**options, lips_colours=0.0).usual_heights) == 0
+    few = list(np.full((LEAST_FRAMES - 1, 2, len(SHARES)), 0.1))
+    assert len(learn_lip_heights(few, few)) == 0
 
 
 def test_the_file_has_the_heights(detector, tmp_path):

@@ -41,3 +41,15 @@ def test_lips_that_pale_end_at_the_step_and_not_where_they_are_half_pale(off_px)
     )
     assert far < HALF_HEIGHT - 3.0
     assert beside == pytest.approx(HALF_HEIGHT, abs=1.0)
+
+
+def test_without_the_outer_plane_the_others_are_the_same():
+    curves = {
+        "outer": ellipse(CENTRE, HALF_WIDTH, HALF_HEIGHT, 240),
+        "inner": ellipse(CENTRE, 0.6 * HALF_WIDTH, 3.0, 240),
+    }
+    asked = pale_lips(0.25), curves, (0.5, 0.95), 50.0
+    planes, inside = lip_planes(*asked), lip_planes(*asked, outer=False)
+    assert set(planes) - set(inside) == {"outer"}
+    for name, plane in inside.items():
+        np.testing.assert_array_equal(plane, planes[name])

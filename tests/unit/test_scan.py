@@ -217,8 +217,8 @@ class Blind:
 
 
 def test_a_scan_without_a_face_is_said_so(generic, monkeypatch):
-    monkeypatch.setattr("vermilion.scan.landmarks._SIZE_PX", 48)  # whoever is blind needs no more
-    ball = trimesh.creation.icosphere(subdivisions=4)
+    monkeypatch.setattr("vermilion.scan.landmarks._SIZE_PX", 16)  # whoever is blind needs no more
+    ball = trimesh.creation.icosphere(subdivisions=3)
     mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))
     with pytest.raises(InputError, match="subject anna: found no face in 168 views"):
         find_landmarks(mesh, Blind(), generic.neutral_mm[generic.landmarks], "anna")

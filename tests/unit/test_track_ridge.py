@@ -60,7 +60,8 @@ def detector():
 
 @pytest.mark.parametrize("outer_px", [-6.0, 6.0, 14.0])
 def test_what_all_frames_share_is_learnt(outer_px):
-    found = learnt(outer_px=outer_px, inner=False).outer_offset * 200
+    outer_alone = TrackRidgeDetector(lips_colours=0.0, lips_heights=0.0)
+    found = learnt(outer_alone, outer_px=outer_px, inner=False).outer_offset * 200
     along = np.r_[8:33, 48:73]  # the corners have little lip beside them
     assert found[along] == pytest.approx(np.full(len(along), -outer_px), abs=1.0)
 

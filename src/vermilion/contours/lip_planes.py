@@ -22,6 +22,7 @@ def lip_planes(
     band: tuple[float, float],
     tolerance: float,
     beside: bool = False,
+    outer: bool = True,
 ) -> dict[str, np.ndarray]:
     """(size, size) float32 planes in [0, 1]: two fall outwards across each contour, one is `flesh`.
 
@@ -29,7 +30,8 @@ def lip_planes(
     (linear discriminant) in the channels `colours` (3, size, size). `inner`: how far the colour is from
     the lips', which is high in the mouth's opening, on teeth and on the dark line of a closed mouth.
     What is lip, the `curves` (n, 2) of both contours and the band of the pass say; `beside`: for
-    `outer`, what lies just beside its curve, as lips pale towards their border.
+    `outer`, what lies just beside its curve, as lips pale towards their border. `outer` false: without
+    that plane.
     """
     size = colours.shape[1]
     inside, to_outer = inside_and_distance(curves["outer"], size)
@@ -41,19 +43,19 @@ def lip_planes(
     if min(lip.sum(), skin.sum()) < LEAST_SAMPLES:
         return {name: np.zeros_like(colours[0]) for name in ("inner", "outer", "flesh")}
     sides = lip, skin
-    if beside:
+    if outer and beside:
         near = (to_outer > BESIDE[0] * scale) & (to_outer < BESIDE[1] * scale)
         found = inside & ~opening & near, ~inside & near
         sides = found if min(side.sum() for side in found) >= LEAST_SAMPLES else sides
     lips = colours[:, lip].T.astype(np.float64)
     away = colours.reshape(3, -1).T - lips.mean(axis=0)
     spread = _covariance(lips) + LEAST_SPREAD**2 * np.eye(3)
-    squared = np.einsum("nk,kl,nl->n", away, np.linalg.inv(spread), away).reshape(size, size)
-    return {
-        "outer": _probability(colours, *sides),
+    squared = np.einsum("nk,nk->n", away @ np.linalg.inv(spread), away).reshape(size, size)
+    planes = {
         "inner": (1.0 - np.exp(-squared / tolerance)).astype(np.float32),
         "flesh": flesh_plane(colours, lip),
     }
+    return planes | {"outer": _probability(colours, *sides)} if outer else planes
 
 
 def _probability(colours: np.ndarray, lip: np.ndarray, skin: np.ndarray) -> np.ndarray:

@@ -277,7 +277,8 @@ def inner_cues(
 
     The borders are thought to be `outer` and `inner` (n, 2) px.
     """
-    planes = lip_planes(colours, {"outer": outer, "inner": inner}, search.band, search.tolerance)
+    curves = {"outer": outer, "inner": inner}
+    planes = lip_planes(colours, curves, search.band, search.tolerance, outer=False)
     lip = inside_of(outer, colours.shape[1]).astype(np.float32)
     return cues_of(colours, planes["flesh"], lip), planes["inner"]
 

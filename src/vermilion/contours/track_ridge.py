@@ -24,6 +24,7 @@ from vermilion.contours.curves import (
     without_crossing,
 )
 from vermilion.contours.lip_heights import (
+    LEAST_FRAMES,
     learn_lip_heights,
     lip_heights,
     seen_heights,
@@ -277,7 +278,7 @@ def _learn_inner(
         if detector.lips_colours:
             odds = learn_lip_odds(colours, outer, borders(), size)
             detector = replace(detector, lip_odds=odds)
-        if detector.lips_heights:
+        if detector.lips_heights and len(regions) >= LEAST_FRAMES:
             seen = [seen_heights(region) / size for region in regions]
             found = [lip_heights(*pair) / size for pair in zip(borders(), outer, strict=True)]
             detector = replace(detector, usual_heights=learn_lip_heights(seen, found))

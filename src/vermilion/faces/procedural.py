@@ -7,7 +7,7 @@ vertex and no triangle, and the tracker's shapes know no rolling of the lips.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -99,6 +99,7 @@ def _rings(length_mm: float, spacing_mm: float) -> int:
     return max(2, round(length_mm / spacing_mm))
 
 
+@cache
 def _tracker_layout(n_triangles: int) -> Layout:
     """The layout whose mesh has about `n_triangles`: counts fall with the spacing squared."""
     make = partial(Layout, coarsening=1.0, fold_rings=2, offset=0.21, fold_end=1.5)

@@ -7,6 +7,7 @@ of rings. Two layouts of different spacing share no vertex and no triangle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -72,15 +73,33 @@ def ring_chart(theta: np.ndarray, border: np.ndarray, radius: float) -> np.ndarr
     return border * (1.0 - fade) + radius * outward / np.abs(outward)
 
 
+@cache
+def _border_places(count: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Loop parameters (count,) and chart points (count,) complex of as many places on the border.
+
+    Layouts have many such rings in common, and each place is found by iteration.
+    """
+    theta = (np.arange(count) + turn) * (2 * np.pi / count)
+    border = border_chart(theta)
+    theta.flags.writeable = border.flags.writeable = False
+    return theta, border
+
+
+@cache
+def _dense_border() -> tuple[np.ndarray, np.ndarray]:
+    """As `_border_places`, closed: the last of 1441 places is the first."""
+    dense = np.linspace(0, 2 * np.pi, 1441)
+    border = border_chart(dense[:-1])
+    return dense, np.append(border, border[0])
+
+
 def skin_rings(layout: Layout) -> list[np.ndarray]:
     """Chart rings of the skin from the border outwards, each (n,) complex.
 
     The first `n_strips` + 1 have the same number of points, aligned by theta.
     """
     scale = chart_scale_mm()
-    dense = np.linspace(0, 2 * np.pi, 1441)
-    dense_border = border_chart(dense[:-1])
-    dense_border = np.append(dense_border, dense_border[0])
+    dense, dense_border = _dense_border()
     rings = [border_chart(layout.border_theta())]
     distance = radius = 0.0
     while radius < 1.0:
@@ -96,8 +115,7 @@ def skin_rings(layout: Layout) -> list[np.ndarray]:
             turn = 0.5 * (len(rings) % 2) + layout.offset
         if len(rings) == layout.n_strips + 1:
             count, turn = layout.n_border, 0.5
-        theta = (np.arange(count) + turn) * (2 * np.pi / count)
-        rings.append(ring_chart(theta, border_chart(theta), radius))
+        rings.append(ring_chart(*_border_places(count, turn), radius))
     return rings
 
 
