@@ -190,7 +190,7 @@ def learn_from_take(
     frames: Iterable[int],
     read: Callable[[int], np.ndarray],
     landmarks_px: Callable[[int], np.ndarray],
-    lips_px: Callable[[int], tuple[np.ndarray, np.ndarray]],
+    lips_px: Callable[[int], tuple[np.ndarray, np.ndarray] | None],
     reach: float,
     inner: bool = True,
 ) -> TrackRidgeDetector | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vermilion.storage.kernels import kernel
 
-SKIN, MOUTH, TEETH, EYE = 0, 1, 2, 3
+SKIN, MOUTH, TEETH, EYE, TONGUE = 0, 1, 2, 3, 4
 MASK = 63  # noise volumes are 64 cells wide
 
 
@@ -208,7 +208,7 @@ def shade_hits(
             if lip_here > 0.0:
                 gloss, power, bump = 0.035, 26.0, 0.04
             if inside_here > 2.0:
-                gloss, power, bump = 0.03, 60.0, 0.0
+                gloss, power, bump = 0.03 * look.wet, 60.0, 0.0
         elif kind == EYE:
             _eye_albedo(albedo, volume, look, p)
             gloss, power, wrap, bump = 0.05, 420.0, 0.6, 0.0
@@ -216,12 +216,12 @@ def shade_hits(
             grain = 1.0 + 0.05 * _octave(volume, p[0], p[1], p[2], 1.0, footprint, 1.0)
             for c in range(3):
                 albedo[c] = look.teeth[c] * grain
-            gloss, power, bump = 0.04, 90.0, 0.0
+            gloss, power, bump = 0.04 * look.wet, 90.0, 0.0
         else:
             grain = 1.0 + 0.12 * _octave(volume, p[0], p[1], p[2], 0.8, footprint, 1.0)
             for c in range(3):
-                albedo[c] = look.inside[c] * 1.35 * grain
-            gloss, power, bump = 0.03, 50.0, 0.0
+                albedo[c] = (look.tongue[c] if kind == TONGUE else look.gums[c]) * grain
+            gloss, power, bump = 0.03 * look.wet, 50.0, 0.0
         if bump > 0.0:
             for c in range(3):
                 shift = 17.3 * (c + 1)

@@ -11,7 +11,10 @@ NOISE_SIZE = 64
 
 
 class Look(NamedTuple):
-    """Linear RGB albedos (3,) float32 and strengths; a NamedTuple so that numba can read it."""
+    """Linear RGB albedos (3,) float32 and strengths; a NamedTuple so that numba can read it.
+
+    `inside` is that of the inside of lips and cheeks; `wet` a factor of the gloss in the mouth.
+    """
 
     skin: np.ndarray
     lips: np.ndarray
@@ -20,11 +23,14 @@ class Look(NamedTuple):
     cloth: np.ndarray
     iris: np.ndarray
     inside: np.ndarray
+    gums: np.ndarray
+    tongue: np.ndarray
     teeth: np.ndarray
     paint_light: np.ndarray
     paint_dark: np.ndarray
     grain: float
     tattoo: float
+    wet: float
     shift_mm: np.ndarray
 
 
@@ -51,11 +57,14 @@ def look_of(seed: int, tattoo: bool) -> Look:
         cloth=colour(cloths[rng.integers(len(cloths))]),
         iris=colour(irises[rng.integers(len(irises))]),
         inside=colour([0.26, 0.085, 0.08]),
+        gums=colour([0.351, 0.11475, 0.108]),
+        tongue=colour([0.40, 0.17, 0.15]),
         teeth=colour([0.62, 0.57, 0.46]),
         paint_light=colour([0.66, 0.64, 0.58]),
         paint_dark=colour([0.045, 0.065, 0.17]),
         grain=float(rng.uniform(0.85, 1.15)),
         tattoo=1.0 if tattoo else 0.0,
+        wet=1.0,
         shift_mm=colour(rng.uniform(0, 1000, 3)),
     )
 

@@ -6,14 +6,13 @@ from vermilion.config.contours import ContourDetectorConfig
 from vermilion.contours.labelled_frames import offset_rows, read_labelled
 from vermilion.contours.landmark_ridge import LandmarkRidgeDetector
 from vermilion.contours.landmark_rings import LandmarkRings, dense_lips
-from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
+from vermilion.contours.take_detector import detector_from_rings
 from vermilion.contours.training import ContourTrainingSettings, train_detector
 from vermilion.faces.model import FaceModel
 from vermilion.features.tracked_lips import TrackedLips
 from vermilion.imaging.frames import open_frames
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.provenance.begun_run import begin_job
-from vermilion.storage.frames import evenly_taken
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence, rows_of_frames
 from vermilion.tracking.result import TrackedTake
@@ -37,27 +36,6 @@ class TrackedRings:
         return self.lips.rings_px(read_sequence(path)[row], self.fit.camera)
 
 
-def from_track(cfg, camera, source, track, rings, dense):
-    """The detector that a take's own images and the rings tell; None where no frame serves."""
-    options = cfg.track
-    inner_reach = cfg.lips_reach if dense else options.inner_reach
-    landmarks = dict(zip(track.frames.tolist(), track.points_px, strict=True))
-    detector = TrackRidgeDetector.of(
-        cfg, inner_reach, frame_reach=options.frame_reach, lip_reach=options.lip_reach,
-        lips_shade=cfg.lips_shade if dense else 0.0, lips_colours=cfg.lips_colours,
-        lips_heights=cfg.lips_heights,
-    )  # fmt: skip
-    return learn_from_take(
-        detector,
-        sorted(evenly_taken(rings.frames, options.frames)),
-        lambda frame: source.read(camera, frame),
-        landmarks.__getitem__,
-        rings,
-        options.reach,
-        inner=not dense,
-    )
-
-
 def main(snakemake) -> None:
     cfg = ContourDetectorConfig(**snakemake.params.cfg["contours.detector"])
     subject, take = snakemake.wildcards.subject, snakemake.wildcards.take
@@ -77,7 +55,9 @@ def main(snakemake) -> None:
         )
     if cfg.kind in ("auto", "track"):
         rings = LandmarkRings(found) if dense else TrackedRings(snakemake.input, track)
-        by_track = from_track(cfg, camera, source, track, rings, dense)
+        by_track = detector_from_rings(
+            cfg, lambda frame: source.read(camera, frame), found, rings, rings.frames, dense
+        )
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)
     if labelled:
