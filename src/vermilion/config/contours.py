@@ -132,7 +132,8 @@ class ContourDetectorConfig(StageConfig):
         ge=0,
         le=2,
         description="Where the lips of dense landmarks are the start: what the dark line between a lip and "
-        "the teeth counts as an edge (share of the strongest).",
+        "the teeth counts as an edge (share of the strongest), and a gap between the teeth and the lower lip against "
+        "a border above it.",
     )
     lips_colours: float = Field(
         0.5,

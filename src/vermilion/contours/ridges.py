@@ -27,6 +27,7 @@ from vermilion.contours.gums import creases
 from vermilion.contours.holes import hole_edges
 from vermilion.contours.lip_heights import held_back
 from vermilion.contours.lip_planes import dark_lines, lip_planes
+from vermilion.contours.lower_gaps import lower_gaps
 from vermilion.contours.paths import cheapest_ring, step_cost
 from vermilion.contours.region import MouthRegion
 
@@ -160,6 +161,7 @@ class RidgeDetector(ContourDetector):
         points = curve[:, None] + places[None, :, None] * normals[:, None]
         fall = np.maximum(-np.gradient(sampled(plane, points), step_px, axis=1), 0.0)
         fall = np.minimum(fall / max(np.percentile(fall.max(axis=1), 75), 1e-6), 1.0)
+        cost = np.tile((places / reach_px) ** 2, (len(curve), 1))
         if inside is not None:
             near = self._contact(curve, points, inside)[:, None]
             line = sampled(inside.contact, points)
@@ -167,10 +169,13 @@ class RidgeDetector(ContourDetector):
             fall += LINE_SHARE * near * (line - fall)
             if self.lips_shade:
                 before = self._before_teeth(curve, normals, inside, step_px, count)
-                fall += self.lips_shade * (1 - near) * line * before
+                planes = inside.lightness, inside.lip
+                gap, dark = lower_gaps(planes, curve, normals, step_px, count)
+                fall += self.lips_shade * (1 - near) * line * before * (1 - gap)
+                cost += self.lips_shade * (1 - near) * dark
             crease, beyond = self._creases(curve, normals, inside, step_px, count)
             fall += (1.0 - near) * (crease - beyond * fall)
-        cost = (places / reach_px) ** 2 - self.edge_weight * fall
+        cost -= self.edge_weight * fall
         if inside is not None and inside.unusual is not None:
             cost += of_halves(inside.unusual, points)
         chosen = cheapest_ring(cost, step_cost(curve, step_px, self.stiffness))
