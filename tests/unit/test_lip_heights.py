@@ -14,8 +14,10 @@ from vermilion.contours.lip_heights import (
     LEAST_FRAMES,
     SHARES,
     USUAL,
+    SeenLips,
     learn_lip_heights,
     lip_heights,
+    seen_lips,
     told_heights,
     unusual_heights,
 )
@@ -99,50 +101,88 @@ def test_heights_are_distances_to_the_outer_border():
     np.testing.assert_allclose(lip_heights(inner @ turned.T, outer @ turned.T), found, atol=0.02)
 
 
-def test_a_third_of_wrong_frames_does_not_move_the_line():
+def seen_in(heights, placed=None, width=0.5):
+    """Lips that landmarks see; `placed` as high as `heights` where nothing else is said."""
+    heights = np.broadcast_to(np.asarray(heights, dtype=float), (2, len(SHARES)))
+    return SeenLips(heights, heights if placed is None else placed, width)
+
+
+def test_a_third_of_wrong_frames_does_not_move_the_told_heights():
     random = np.random.default_rng(3)
     seen = 0.08 + 0.02 * random.random((30, 2, 1)) + np.zeros((30, 2, len(SHARES)))
-    found = 0.7 * seen + 0.01 + 0.001 * random.standard_normal(seen.shape)
-    wrong = found.copy()
-    wrong[::3, 0] += 0.05  # the upper lip's border below the teeth
-    line = learn_lip_heights(list(seen), list(wrong))
-    told, _ = told_heights(line, seen[0])
-    np.testing.assert_allclose(told, 0.7 * seen[0] + 0.01, atol=0.0015)
-    assert line[..., 2] == pytest.approx(0.7, abs=0.1)
+    own = 0.7 * seen + 0.01
+    placed = own + 0.012  # the landmarks' inner ring lies too far inside, in all frames alike
+    found = own + 0.001 * random.standard_normal(seen.shape)
+    found[::3, 0] += 0.05  # the upper lip's border below the teeth
+    lips = [seen_in(*pair) for pair in zip(seen, placed, strict=True)]
+    usual, width = learn_lip_heights(lips, list(found))
+    told, _ = told_heights(usual, width, lips[0])
+    np.testing.assert_allclose(told, own[0], atol=0.002)
+    assert usual[..., 2] == pytest.approx(0.7, abs=0.1)
+    assert usual[1, :, 3] == pytest.approx(-0.012, abs=0.001)
+
+
+def test_both_that_landmarks_say_count_alike():
+    """Where their outer ring is wrong in a frame, only one of the two told heights is."""
+    usual = np.tile([0.1, 0.09, 1.0, 0.0], (2, len(SHARES), 1))
+    placed = np.full((2, len(SHARES)), 0.09)
+    right = told_heights(usual, 0.5, seen_in(0.1, placed))[0]
+    assert right == pytest.approx(0.09)
+    assert told_heights(usual, 0.5, seen_in(0.12, placed))[0] == pytest.approx(right + 0.01)
+    assert told_heights(usual, 0.5, seen_in(0.1, placed + 0.02))[0] == pytest.approx(right + 0.01)
 
 
 def test_lips_unlike_the_takes_are_told_less_surely():
-    line = np.tile([0.1, 0.09, 0.8], (2, len(SHARES), 1))
-    usual = told_heights(line, np.full((2, len(SHARES)), 0.1))[1]
-    pursed = told_heights(line, np.full((2, len(SHARES)), 0.2))[1]
-    assert usual == pytest.approx(USUAL)
-    assert (pursed > 2 * usual).all()
+    line = np.tile([0.1, 0.09, 0.8, 0.0], (2, len(SHARES), 1))
+    assert told_heights(line, 0.5, seen_in(0.1))[1] == pytest.approx(USUAL)
+    assert told_heights(line, 0.5, seen_in(0.1, width=0.6))[1] == pytest.approx(USUAL)
+    higher = told_heights(line, 0.5, seen_in(0.2))[1]
+    pursed = told_heights(line, 0.5, seen_in(0.1, width=0.35))[1]
+    assert (higher > 2 * USUAL).all()
+    assert (pursed > 2 * USUAL).all()
 
 
 def test_the_told_height_costs_nothing_and_corners_are_not_told(detector):
     _, landmarks, rings, _ = frame(12.0)
     region = detector.region(landmarks, rings)
-    line = np.tile([0.0, 0.1, 0.0], (2, len(SHARES), 1))  # 20 px, whatever landmarks say
     outer = loop_spline(region.outer_px)
-    cost = unusual_heights(line, region, outer, 200.0)
+    seen = seen_lips(region, outer, 200.0)
+    line = np.zeros((2, len(SHARES), 4))  # 20 px, whatever landmarks say
+    line[..., 0], line[..., 1], line[..., 3] = seen.heights, 0.1, 0.1 - seen.placed
+    cost = unusual_heights((line, seen.width), region, outer, 200.0)
     middle = int(region.outer_px[:, 0].mean())
     top, bottom = int(outer[:, 1].min()), int(outer[:, 1].max())
     assert cost[0, top + 20, middle] < 0.2
     assert cost[1, bottom - 20, middle] < 0.2
-    assert cost[0, top + 35, middle] > 1.5 > cost[0, top + 26, middle]
+    assert cost[0, top + 26, middle] > 4.0
     corner = outer[0].astype(int)
     assert (cost[:, corner[1], : corner[0] + 8] == 0).all()
+
+
+def test_a_higher_lip_costs_more_than_a_lower_one(detector):
+    """Teeth, gums and tongues make lips higher; hardly anything makes them lower."""
+    _, landmarks, rings, _ = frame(12.0)
+    region = detector.region(landmarks, rings)
+    outer = loop_spline(region.outer_px)
+    seen = seen_lips(region, outer, 200.0)
+    line = np.zeros((2, len(SHARES), 4))
+    line[..., 0], line[..., 1], line[..., 3] = seen.heights, 0.1, 0.1 - seen.placed
+    cost = unusual_heights((line, seen.width), region, outer, 200.0)
+    middle, top = int(region.outer_px[:, 0].mean()), int(outer[:, 1].min())
+    assert cost[0, top + 23, middle] > 2 * cost[0, top + 17, middle] > 0
 
 
 def test_few_frames_and_weight_0_learn_nothing():
     for options in ({"openings": OPENINGS[: LEAST_FRAMES - 1]}, {"share": 0.0}):
         assert len(learnt(**options, lips_colours=0.0).usual_heights) == 0
     few = list(np.full((LEAST_FRAMES - 1, 2, len(SHARES)), 0.1))
-    assert len(learn_lip_heights(few, few)) == 0
+    lips = [SeenLips(height, height, 0.5) for height in few]
+    assert len(learn_lip_heights(lips, few)[0]) == 0
 
 
 def test_the_file_has_the_heights(detector, tmp_path):
     detector.save(tmp_path / "detector.npz")
     loaded = load_detector(tmp_path / "detector.npz")
     np.testing.assert_array_equal(loaded.usual_heights, detector.usual_heights)
+    assert loaded.usual_width == detector.usual_width > 0
     assert loaded.lips_heights == detector.lips_heights

@@ -12,7 +12,7 @@ from vermilion.contours.labels import CONTOURS
 from vermilion.contours.region import MouthRegion, mouth_region
 from vermilion.storage.arrays import write_arrays
 
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 
 
 class ContourDetector(ABC):

@@ -2,14 +2,17 @@
 
 Teeth in the shade, gums and tongues may have the lip's own colour, and then no edge of a single frame tells
 where the lip ends. But how high a lip is, from its outer to its inner border, is known nearly: dense
-landmarks say it, but for an error that the frames of a take share. Most frames show their borders clearly,
-so a robust line through all of them tells this error. A border that would make a lip much higher or lower
-than told then costs more than one that does not.
+landmarks say it, but for an error that the frames of a take share. They say it twice: by the height between
+their two borders, and by where their inner border lies in the image. Most frames show their borders
+clearly, so a robust line and a median over all of them tell these two errors; the mean of both is the told
+height. A border that would make a lip higher or lower than told then costs more than one that does not. Higher
+costs more than lower: what is mistaken for lip makes lips higher, and little makes them lower.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -28,9 +31,13 @@ LEAST_FRAMES = 6
 ROUNDS, LEAST_SPREAD, FAR = 20, 0.005, 1.5
 COLUMN_PRIOR = 2.0  # frames that speak for the same offset in all columns
 FACTOR_PRIOR = 0.005  # smaller changes of the landmarks' height tell no factor
-#: A lip higher or lower by so much costs as a border one reach from its start: per inter-ocular distance.
-USUAL = 0.015
+#: Deviation of told heights, per inter-ocular distance. One deviation costs as a border one reach from its
+#: start; a higher lip counts as if it deviated by more than it does, a lower one by less.
+USUAL = 0.01
+HIGHER, LOWER = 1.4, 0.7
 FACTOR_ERROR = 0.5  # of the factor: where landmarks see lips unlike the take's, less is told
+#: So is where the mouth is narrower than this share of the usual, as pursed lips are: deviation per share.
+NARROW, NARROW_ERROR = 0.9, 0.25
 MOST = 3.0  # deviations from which on the cost grows linearly
 
 
@@ -60,50 +67,85 @@ def lip_heights(inner: np.ndarray, outer: np.ndarray) -> np.ndarray:
     return np.stack(found)
 
 
-def seen_heights(region: MouthRegion) -> np.ndarray:
-    """Heights (2, K) px of the lips between the rings of a `region`, as landmarks have them."""
-    return lip_heights(loop_spline(region.inner_px), loop_spline(region.outer_px))
+@dataclass(frozen=True)
+class SeenLips:
+    """Lips of a frame as dense landmarks have them, per inter-ocular distance.
+
+    Attributes:
+        heights: (2, K) of the upper and the lower lip, between the landmarks' two rings.
+        placed: (2, K) from the lips' found outer border to the landmarks' inner ring.
+        width: of the mouth, between its corners.
+    """
+
+    heights: np.ndarray
+    placed: np.ndarray
+    width: float
 
 
-def learn_lip_heights(seen: Sequence[np.ndarray], found: Sequence[np.ndarray]) -> np.ndarray:
-    """What tells heights from the landmarks': an array (2, K, 3); (0,) of too few frames.
+def seen_lips(region: MouthRegion, outer: np.ndarray, interocular_px: float) -> SeenLips:
+    """Lips of the landmarks' rings in a `region`, with the found `outer` border (n, 2) px."""
+    inner, ring = loop_spline(region.inner_px), loop_spline(region.outer_px)
+    return SeenLips(
+        lip_heights(inner, ring) / interocular_px,
+        lip_heights(inner, outer) / interocular_px,
+        float(np.linalg.norm(ring[len(ring) // 2] - ring[0])) / interocular_px,
+    )
 
-    The last axis is the landmarks' usual height, the lip's own at that, and by how much the lip's changes
-    with the landmarks'.
+
+def learn_lip_heights(
+    seen: Sequence[SeenLips], found: Sequence[np.ndarray]
+) -> tuple[np.ndarray, float]:
+    """What tells heights from the landmarks': an array (2, K, 4), and the mouth's usual width.
+
+    The last axis is the landmarks' usual height, the lip's own at that, by how much the lip's changes with the
+    landmarks', and by how much it is higher than where the landmarks' inner ring lies. Of too few frames the
+    array is empty, (0,).
 
     Args:
-        seen: heights (2, K) of each frame as landmarks have them, per inter-ocular distance.
-        found: those (2, K) of the borders that were found in it.
+        seen: lips of each frame as landmarks have them.
+        found: heights (2, K) of the borders that were found in it, per inter-ocular distance.
     """
     if len(seen) < LEAST_FRAMES:
-        return np.zeros(0)
-    lips = zip(np.stack(seen, axis=1), np.stack(found, axis=1), strict=True)
-    return np.stack([_robust_line(*lip) for lip in lips])
+        return np.zeros(0), 0.0
+    own = np.stack(found, axis=1)
+    heights = np.stack([lips.heights for lips in seen], axis=1)
+    line = [_robust_line(*lip) for lip in zip(heights, own, strict=True)]
+    beyond = np.median(own - np.stack([lips.placed for lips in seen], axis=1), axis=1)
+    width = float(np.median([lips.width for lips in seen]))
+    return np.concatenate([line, beyond[..., None]], axis=-1), width
 
 
-def told_heights(line: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights of the lips and their deviations, both (2, K), where landmarks have them `seen` (2, K) high.
+def told_heights(
+    usual: np.ndarray, usual_width: float, seen: SeenLips
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heights of lips that landmarks have as `seen`, and their deviations, both (2, K).
 
-    `line` (2, K, 3) as of `learn_lip_heights`; all per inter-ocular distance.
+    Args:
+        usual: (2, K, 4) and `usual_width`, as of `learn_lip_heights`.
     """
-    middle, usual, factor = np.moveaxis(line, -1, 0)
-    away = seen - middle
-    return np.maximum(usual + factor * away, 0.0), np.hypot(USUAL, FACTOR_ERROR * away)
+    middle, own, factor, beyond = np.moveaxis(usual, -1, 0)
+    away = seen.heights - middle
+    by_height = np.maximum(own + factor * away, 0.0)
+    by_place = np.maximum(seen.placed + beyond, 0.0)
+    narrower = max(NARROW - seen.width / max(usual_width, 1e-6), 0.0)
+    unsure = np.hypot(FACTOR_ERROR * away, NARROW_ERROR * narrower)
+    return 0.5 * (by_height + by_place), np.hypot(USUAL, unsure)
 
 
 def unusual_heights(
-    line: np.ndarray, region: MouthRegion, outer: np.ndarray, interocular_px: float
+    usual: tuple[np.ndarray, float], region: MouthRegion, outer: np.ndarray, interocular_px: float
 ) -> np.ndarray:
     """What it costs if a lip ends at a pixel, (2, size, size) float32, of the upper and of the lower lip.
 
     Args:
-        line: (2, K, 3) as of `learn_lip_heights`.
+        usual: heights (2, K, 4) and width as of `learn_lip_heights`.
         region: with the landmarks' rings.
         outer: (n, 2) px, the lips' outer border.
         interocular_px: inter-ocular distance in the region.
     """
-    seen, size = seen_heights(region) / interocular_px, region.size_px
-    told, deviation = (interocular_px * values for values in told_heights(line, seen))
+    heights, width = usual
+    seen, size = seen_lips(region, outer, interocular_px), region.size_px
+    told, deviation = (interocular_px * values for values in told_heights(heights, width, seen))
     start, end = outer[0], outer[len(outer) // 2]
     along = (end - start) / max(float((end - start) @ (end - start)), 1e-6)
     centres = np.arange(size) + 0.5
@@ -115,7 +157,8 @@ def unusual_heights(
         away = np.ones((size, size), dtype=np.uint8)
         cv2.polylines(away, [np.rint(border - 0.5).astype(np.int32)], False, 0)
         distance = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        off = np.abs(distance - height) / spread
+        off = (distance - height) / spread
+        off = np.where(off > 0, HIGHER * off, -LOWER * off)
         costs.append(sure * np.where(off < MOST, off**2, MOST * (2 * off - MOST)))
     return np.stack(costs).astype(np.float32)
 

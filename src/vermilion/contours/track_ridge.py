@@ -27,7 +27,7 @@ from vermilion.contours.lip_heights import (
     LEAST_FRAMES,
     learn_lip_heights,
     lip_heights,
-    seen_heights,
+    seen_lips,
     unusual_heights,
 )
 from vermilion.contours.lip_planes import BESIDE
@@ -66,7 +66,8 @@ class TrackRidgeDetector(RidgeDetector):
         lips_colours: what the take's colours count for the inner border, against those of a frame.
         lip_odds: (2, C, C, C) these colours, as of `learn_lip_odds`; (0,): not known.
         lips_heights: what an unusual height of a lip costs, against an edge.
-        usual_heights: (2, K, 3) what tells the lips' heights, as of `learn_lip_heights`; (0,): not known.
+        usual_heights: (2, K, 4) what tells the lips' heights, as of `learn_lip_heights`; (0,): not known.
+        usual_width: of the mouth, with these, per inter-ocular distance.
     """
 
     kind = "track"
@@ -83,6 +84,7 @@ class TrackRidgeDetector(RidgeDetector):
     lip_odds: np.ndarray = field(default_factory=lambda: np.zeros(0))
     lips_heights: float = 1.0
     usual_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    usual_width: float = 0.0
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
@@ -154,7 +156,8 @@ class TrackRidgeDetector(RidgeDetector):
         start, strength = curve, np.zeros(len(curve))
         unusual = None
         if len(self.usual_heights):
-            unusual = self.lips_heights * unusual_heights(self.usual_heights, region, outer, size)
+            usual = self.usual_heights, self.usual_width
+            unusual = self.lips_heights * unusual_heights(usual, region, outer, size)
         for search in SEARCHES:
             cues, strange = inner_cues(colours, outer, curve, search)
             if search is SEARCHES[0]:
@@ -279,9 +282,10 @@ def _learn_inner(
             odds = learn_lip_odds(colours, outer, borders(), size)
             detector = replace(detector, lip_odds=odds)
         if detector.lips_heights and len(regions) >= LEAST_FRAMES:
-            seen = [seen_heights(region) / size for region in regions]
+            seen = [seen_lips(*pair, size) for pair in zip(regions, outer, strict=True)]
             found = [lip_heights(*pair) / size for pair in zip(borders(), outer, strict=True)]
-            detector = replace(detector, usual_heights=learn_lip_heights(seen, found))
+            heights, width = learn_lip_heights(seen, found)
+            detector = replace(detector, usual_heights=heights, usual_width=width)
         return detector
     tracked = [loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES)) for region in regions]
     for _ in range(INNER_ROUNDS):
