@@ -41,6 +41,12 @@ def test_each_pixel_of_a_gap_outside_a_place_costs_the_same():
     assert below_middle(cost)[-1] == 0
 
 
+def test_dark_corners_are_no_gap():
+    gap, cost = lines(lambda away: np.where((away > -2) & (away < 2), 0.1, 0.5))
+    for values in (gap, cost):
+        assert not values[[40, 41, 42, 43, 77, 78, 79]].any()
+
+
 def test_a_lips_own_shade_is_no_gap():
     gap, cost = lines(lambda away: np.where(away < 2, 0.35, 0.5))
     assert not gap.any()

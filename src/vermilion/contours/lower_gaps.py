@@ -13,6 +13,9 @@ import numpy as np
 from vermilion.contours.curves import sampled
 
 DARK = (0.65, 0.45)  # of no and of a sure gap: its lightness per the lower lip's
+#: The corners of a mouth are dark anyway: no gap counts up to the first share of the lip's length from one,
+#: all of it counts from the second.
+SURE = (0.1, 0.25)
 REACH_PX = 8.0  # a gap is looked for so far outside the search for the border
 COST = 1.0  # of each pixel of a gap outside the border, against the clearest edge's 4
 
@@ -26,7 +29,7 @@ def lower_gaps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """How far each place beside a border is a gap (n, T), and what the gap outside of it costs (n, T).
 
-    Zero beside the upper lip, the first half of the curve.
+    Zero beside the upper lip, the first half of the curve, and at the corners.
 
     Args:
         planes: (size, size) lightness, and 1 inside the lips' outer border.
@@ -41,7 +44,11 @@ def lower_gaps(
     if not (outside := lip & (places > 0)).any():
         return gap, cost
     share = light / max(float(np.median(light[outside])), 1e-6)
-    dark = np.where(lip, np.clip((DARK[0] - share) / (DARK[0] - DARK[1]), 0.0, 1.0), 0.0)
+    along = np.linspace(0.0, 1.0, len(points))
+    sure = np.clip((np.minimum(along, 1 - along) - SURE[0]) / (SURE[1] - SURE[0]), 0.0, 1.0)
+    dark = sure[:, None] * np.where(
+        lip, np.clip((DARK[0] - share) / (DARK[0] - DARK[1]), 0.0, 1.0), 0.0
+    )
     left = COST * step_px * np.cumsum(dark[:, ::-1], axis=1)[:, ::-1]
     gap[half:], cost[half:] = dark[:, : 2 * count + 1], left[:, : 2 * count + 1]
     return gap, cost

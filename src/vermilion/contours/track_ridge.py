@@ -67,7 +67,7 @@ class TrackRidgeDetector(RidgeDetector):
         lip_odds: (2, C, C, C) these colours, as of `learn_lip_odds`; (0,): not known.
         lips_heights: what an unusual height of a lip costs, against an edge.
         usual_heights: (2, K, 4) what tells the lips' heights, as of `learn_lip_heights`; (0,): not known.
-        usual_width: of the mouth, with these, per inter-ocular distance.
+        usual_width: (), of the mouth, with these, per inter-ocular distance.
     """
 
     kind = "track"
@@ -84,7 +84,7 @@ class TrackRidgeDetector(RidgeDetector):
     lip_odds: np.ndarray = field(default_factory=lambda: np.zeros(0))
     lips_heights: float = 1.0
     usual_heights: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    usual_width: float = 0.0
+    usual_width: np.ndarray = field(default_factory=lambda: np.zeros(()))
 
     def region_likelihood(self, image: np.ndarray, region: MouthRegion) -> dict[str, np.ndarray]:
         """Contour -> likelihood (size, size) of a cropped `image` (size, size, 3), linear RGB."""
@@ -156,7 +156,7 @@ class TrackRidgeDetector(RidgeDetector):
         start, strength = curve, np.zeros(len(curve))
         unusual = None
         if len(self.usual_heights):
-            usual = self.usual_heights, self.usual_width
+            usual = self.usual_heights, float(self.usual_width)
             unusual = self.lips_heights * unusual_heights(usual, region, outer, size)
         for search in SEARCHES:
             cues, strange = inner_cues(colours, outer, curve, search)
@@ -285,7 +285,7 @@ def _learn_inner(
             seen = [seen_lips(*pair, size) for pair in zip(regions, outer, strict=True)]
             found = [lip_heights(*pair) / size for pair in zip(borders(), outer, strict=True)]
             heights, width = learn_lip_heights(seen, found)
-            detector = replace(detector, usual_heights=heights, usual_width=width)
+            detector = replace(detector, usual_heights=heights, usual_width=np.array(width))
         return detector
     tracked = [loop_spline(smoothed_halves(region.inner_px, EDGE_PASSES)) for region in regions]
     for _ in range(INNER_ROUNDS):
