@@ -6,7 +6,8 @@ with a label a frame, as `lips_on_labels` reads them. Landmarks are the network'
 for contours with settings of `contours.detector` changed one at a time, over frames of the first half of the
 actors (`chosen`) and of the second (`locked`):
 
-- `inner`: mean distance of true and found inner border, px at a mouth of 120 px; the mean of each actor's worst;
+- `inner`: mean distance of true and found inner border, px at a mouth of 120 px;
+- `worst`: mean over the actors of each one's worst frame;
 - `opening`: median of the openings as a share of the true ones, over frames that are open by more than 4 px,
   and the share of those that lie outside 0.85 to 1.15;
 - `closed`: mean height in px of the other frames, less the true one.
@@ -75,7 +76,8 @@ def run(arguments: argparse.Namespace) -> None:
     model = face_model(arguments.data / "ict-facekit" / "FaceXModel.tar.xz")
     tables = []
     for seed in range(arguments.actors):
-        folder = arguments.out / f"actor{seed:02d}"
+        # Another number of frames is another performance.
+        folder = arguments.out / f"actor{seed:02d}_{arguments.frames}"
         write_take(VariedMouth(model, seed, arguments.frames), folder)
         take = Take.read(folder, arguments.network)
         half = "chosen" if seed < arguments.actors // 2 else "locked"

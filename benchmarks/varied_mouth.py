@@ -92,9 +92,13 @@ class VariedMouth:
         return np.random.default_rng([self.seed, 7022])
 
     @cached_property
+    def _own(self) -> FaceModel:
+        return with_own_expressions(self.base, self.seed, 1.0)
+
+    @cached_property
     def model(self) -> FaceModel:
         """The base with this actor's expressions, and the tongue's triangles after its own."""
-        own = with_own_expressions(self.base, self.seed, 1.0)
+        own = self._own
         return replace(own, triangles=np.concatenate([own.triangles, self._tongue_triangles]))
 
     @cached_property
@@ -131,8 +135,7 @@ class VariedMouth:
     @cached_property
     def _head_mm(self) -> np.ndarray:
         """(F, V, 3) without the tongue, head frame."""
-        own = with_own_expressions(self.base, self.seed, 1.0)
-        return np.stack([own.vertices(self._identity, row) for row in self.weights])
+        return np.stack([self._own.vertices(self._identity, row) for row in self.weights])
 
     @cached_property
     def _front_teeth(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The actors of `python -m benchmarks mouths`: what a tongue hides, and what one border is."""
+"""The actors of `python -m benchmarks mouths`: what a tongue hides, and how its border runs."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,7 +44,7 @@ def borders(head):
 
 
 def depth_of_border(lines, side):
-    """Mean height (px, downwards) of the middle half of a border."""
+    """Mean height (px, downwards) of the middle fifth of a border."""
     line = lines[side]
     share = (line[:, 0] - line[0, 0]) / (line[-1, 0] - line[0, 0])
     return line[(share > 0.4) & (share < 0.6), 1].mean()

@@ -32,7 +32,7 @@ class StudioSurface:
         lip_mm: (V,) float32 distance from the vermilion border, positive on the red side.
         inside_mm: (V,) float32 distance past the line where the lips meet, positive inside.
         upper: (V,) bool, nearer to the upper lip than to the lower.
-        material: (T,) uint8 of SKIN, MOUTH (gums), TEETH, EYE, TONGUE.
+        material: (T,) uint8 of SKIN, MOUTH (gums, the model's tongue), TEETH, EYE; TONGUE where one is added.
         brows_mm: (2, 5, 2) float32 x and y of both brows in the neutral.
         chin_mm: height of the chin in the neutral.
     """
