@@ -162,7 +162,8 @@ def finder(scene: Scene) -> Callable:
 
 def detectors_of(scene: Scene, rings: dict[int, Rings]) -> dict[str, ContourDetector]:
     """The detectors, each learnt from what the take has."""
-    detectors: dict[str, ContourDetector] = {"landmarks": LandmarkRidgeDetector()}
+    # Curves of 66 landmarks, as the workflow takes them: rendered lips have no shade of their own.
+    detectors: dict[str, ContourDetector] = {"landmarks": LandmarkRidgeDetector(lips_shade=0.0)}
     labelled = list(scene.labels.values())
     if scene.coarse is not None:
         cfg = ContourDetectorConfig()

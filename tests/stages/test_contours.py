@@ -44,6 +44,7 @@ def of_take(root) -> dict:
         "tracker": root / "tracker.npz",
         "fit": root / "fit.npz",
         "coarse": [root / "000000-000004.npy"],
+        "around": [],
     }
 
 

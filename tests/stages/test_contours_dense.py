@@ -7,6 +7,7 @@ import pytest
 
 from tests.stages.run_script import run_script
 from tests.unit.mouths import draw_mouth
+from vermilion.contours.detector_file import load_detector
 from vermilion.contours.maps import read_maps
 from vermilion.imaging.images import write_image
 from vermilion.landmarks.detector import LandmarkTrack
@@ -56,7 +57,7 @@ def maps(request, tmp_path_factory):
         "contours/contour_detector",
         wildcards=NAME,
         params=params,
-        input={"landmarks": [landmarks]},
+        input={"landmarks": [landmarks], "around": []},
         output={"detector": detector, "quality": root / "labels.tsv"},
     )
     run_script(
@@ -83,3 +84,36 @@ def test_crests_lie_on_the_lips_borders(maps, frame):
         above, below = column[:middle].argmax() + 0.5, middle + column[middle:].argmax() + 0.5
         assert abs(CENTRE[1] - above - half) < 1.5  # px
         assert abs(below - CENTRE[1] - half) < 1.5
+
+
+def test_a_short_take_learns_from_the_frames_around_it(tmp_path):
+    """Twelve drawn mouths tell how high this person's lips are; the take alone, two of them, does not."""
+    points = []
+    for frame in range(12):
+        image, landmarks, _ = draw_mouth(6.0 + frame % 7, HEIGHT, seed=frame)
+        write_image(tmp_path / f"take/frames/cam/{frame:06d}.png", image)
+        points.append(dense_points(6.0 + frame % 7, landmarks))
+
+    def track(name, frames):
+        found = np.stack([points[frame] for frame in frames])
+        ones = np.ones((len(frames), 478)), np.ones(len(frames), bool)
+        LandmarkTrack(np.array(frames), found, *ones, MEDIAPIPE478).save(tmp_path / name)
+        return tmp_path / name
+
+    own, around = track("own.npz", [5, 6]), track("around.npz", [0, 1, 2, 3, 4, 7, 8, 9, 10, 11])
+    learnt = []
+    for name, more in (("alone.npz", []), ("whole.npz", around)):
+        run_script(
+            "contours/contour_detector",
+            wildcards=NAME,
+            params={
+                "cfg": {"contours.detector": {"kind": "track"}},
+                "source": str(tmp_path / "take"),
+                "capture": str(tmp_path / "take"),
+                "camera": "cam",
+            },
+            input={"landmarks": [own], "around": more},
+            output={"detector": tmp_path / name, "quality": tmp_path / "labels.tsv"},
+        )
+        learnt.append(load_detector(tmp_path / name))
+    assert not len(learnt[0].usual_heights) and len(learnt[1].usual_heights)

@@ -111,7 +111,7 @@ def test_every_rule_has_log_resources_and_fingerprint(path):
 #: Ways to wait for images: in a bucket, each also gives the images themselves.
 WAITS = (
     "mono_images", "chunk_images", "captured_take", "captured_chunk", "captured_neutral", "window_images",
-    "images_of", "capture_inputs", "landmark_model_inputs", "exports_need",
+    "images_of", "capture_inputs", "landmark_model_inputs", "exports_need", "files_around",
 )  # fmt: skip
 
 

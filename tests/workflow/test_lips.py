@@ -18,7 +18,7 @@ from .conftest import Project
 
 TRACK = {
     "face_model", "video_facts", "capture", "cameras", "landmarks_faces",
-    "landmarks_followed", "landmarks", "image_identity", "tracking", "tracking_topology",
+    "landmarks_followed", "landmarks", "landmarks_around", "image_identity", "tracking", "tracking_topology",
     "appearance", "image_fit", "image_fit_join", "tracking_meshes", "contour_detector", "contours", "features", "apply", "apply_export", "quality", "lips_page",
 }  # fmt: skip
 
@@ -31,7 +31,13 @@ def write_photo(path):
     write_srgb8(path, np.full((64, 48, 3), 90, np.uint8))
 
 
-def lips_of(fresh_project, tmp_path, name, write):
+def write_images(path):
+    path.mkdir()
+    for frame in range(1, 41):
+        write_photo(path / f"{frame:04d}.png")
+
+
+def lips_of(fresh_project, tmp_path, name, write, **asked):
     """A project whose configuration is that of a file, and options of Snakemake."""
     environment = tmp_path / "landmarks" / "bin"
     environment.mkdir(parents=True)
@@ -39,7 +45,7 @@ def lips_of(fresh_project, tmp_path, name, write):
     clip = tmp_path / name
     write(clip)
     results = tmp_path / "out put"
-    write_shot(LipShot(clip, str(results), {"name": "procedural"}))
+    write_shot(LipShot(clip, str(results), {"name": "procedural"}, **asked))
     project = Project(fresh_project.folder, str(results / "config.yaml"))
     place = json.dumps(
         {"detector": "mediapipe", "mediapipe": {"environment": str(environment.parent)}}
@@ -62,7 +68,21 @@ def test_contours_alone_run_nothing_that_learns_or_measures(shot):
 @pytest.mark.slow
 def test_a_photograph_takes_the_path_of_a_video(fresh_project, tmp_path):
     project, options = lips_of(fresh_project, tmp_path, "Größe 1.jpg", write_photo)
-    assert set(project.would_run(*options)) == TRACK - {"video_facts"}
+    assert set(project.would_run(*options)) == TRACK - {"video_facts", "landmarks_around"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("asked", "around"), [({"first": 20, "last": 25}, 16), ({}, 0)])
+def test_a_piece_of_numbered_images_learns_from_those_around_it(
+    fresh_project, tmp_path, asked, around
+):
+    project, options = lips_of(fresh_project, tmp_path, "shot", write_images, **asked)
+    run = project.snakemake("--dry-run", *options)
+    printed = run.stdout + run.stderr
+    body = printed.partition("rule landmarks_around:")[2].partition("rule ")[0]
+    assert body.partition("output:")[0].count(".png") == around
+    short = json.dumps({"detector": {"track": {"span": 0}}})
+    assert "landmarks_around" not in project.would_run(*options, f"contours={short}")
 
 
 @pytest.mark.slow

@@ -27,12 +27,22 @@ def tracked_lips(wildcards):
     }
 
 
+def lips_around(wildcards):
+    """Landmarks around a short take without labels, which help to learn what its lips look like."""
+    by_track = CONFIG.contours.detector.kind in ("auto", "track") and dense_landmarks()
+    labels = CONFIG.contours.detector.kind == "auto" and contour_labels(wildcards)
+    if not by_track or labels or not files_around(wildcards):
+        return []
+    return fill(P.landmarks_around, wildcards)
+
+
 rule contour_detector:
     """Trains the inner and outer contour detectors of a take: contours/detector.npz, quality of labels."""
     input:
         unpack(tracked_lips),
         images=mono_images,
         landmarks=per_chunk(P.landmarks),
+        around=lips_around,
         labels=contour_labels,
     output:
         detector=P.contour_detector,

@@ -5,6 +5,8 @@ among them (landmarks/key_frames.npz), and between these flow corrects (landmark
 """
 
 from vermilion.storage.errors import InputError
+from vermilion.imaging.source import is_video
+from vermilion.landmarks.around import frames_around_take
 from vermilion.landmarks.choose import usable_kind
 from vermilion.landmarks.labels import label_files
 from vermilion.landmarks.networks import FACE_FILE, LANDMARK_FILE
@@ -215,6 +217,62 @@ rule landmarks:
         camera=mono_camera,
     script:
         "../scripts/landmarks/landmarks.py"
+
+
+def source_frames(wildcards):
+    """First and last frame of a take's images; nothing of a video file, which the job opens."""
+    source = take_of(wildcards).source
+    files = {} if is_video(source) else capture_files(source)
+    return [min(files), max(files)] if files else []
+
+
+def files_around(wildcards):
+    """Files of the frames around a short take that may tell its lips, too; none where there are none."""
+    take, options = take_of(wildcards), CONFIG.contours.detector.track
+    if take.source == STUDIO or take.role == "tattoo":
+        return []
+    if is_video(take.source):
+        return [take.source] if take.last - take.first + 1 < options.span else []
+    files, ends = capture_files(take.source), source_frames(wildcards)
+    frames = frames_around_take(
+        (take.first, take.last), ends or (0, 0), options.span, options.frames
+    )
+    return [path for frame in frames for path in files.get(frame, [])]
+
+
+rule landmarks_around:
+    """Finds the followed face in frames of the source around a short take: landmarks/around.npz."""
+    input:
+        source=files_around,
+        faces=per_chunk(P.faces),
+        followed=P.followed,
+        detector=detector_files,
+        files=landmark_file_input,
+    output:
+        landmarks=P.landmarks_around,
+    log:
+        P.log("landmarks_around", "take"),
+    benchmark:
+        P.benchmark("landmarks_around", "take")
+    resources:
+        mem_mb=growing(1000, for_mono=60),
+        runtime=growing(30),
+    params:
+        cfg=detector_cfg(
+            "landmarks.files",
+            "landmarks.following",
+            "contours.detector.track.frames",
+            "contours.detector.track.span",
+        ),
+        code=code_of("landmarks/landmarks_around"),
+        source=source_of,
+        source_frames=source_frames,
+        camera=mono_camera,
+        frames=take_span,
+        face=followed_face,
+        model=detector_path,
+    script:
+        "../scripts/landmarks/landmarks_around.py"
 
 
 if CONFIG.landmarks.correction.mode == "flow":

@@ -53,6 +53,7 @@ class P:
     followed_table = _TAKE + "/landmarks/followed.tsv"
     landmarks = _TAKE + "/landmarks/{chunk}.npz"
     landmarks_folder = _TAKE + "/landmarks"
+    landmarks_around = _TAKE + "/landmarks/around.npz"
     key_frames = _TAKE + "/landmarks/key_frames.npz"
     key_frames_table = _TAKE + "/landmarks/key_frames.tsv"
     views_neutral = _TAKE + "/landmarks/views_neutral.npz"

@@ -31,6 +31,7 @@ STUDIO_CAMERA_KEYS = (
 )
 #: Those that a take may have of its own.
 STUDIO_OWN_CAMERA_KEYS = ("camera_distance_mm", "video_view_mm", "video_size_px")
+STUDIO_OWN_MOTION_KEYS = ("head_turn_deg", "head_shift_mm")
 STUDIO_IMAGE_KEYS = (
     "occlusion_directions",
     "light_samples",
@@ -60,17 +61,22 @@ def studio_plan(take):
         "fps": take.fps,
         "actor": {"seed": subject.seed, "identity": subject.identity},
         "performance": studio_performance(take).model_dump(
-            mode="json", exclude=set(STUDIO_OWN_CAMERA_KEYS)
+            mode="json", exclude={*STUDIO_OWN_CAMERA_KEYS, *STUDIO_OWN_MOTION_KEYS}
         ),
         **studio_values(STUDIO_PLAN_KEYS),
+        **studio_own(take, STUDIO_OWN_MOTION_KEYS),
     }
+
+
+def studio_own(take, keys):
+    """Values that a take has of its own, of these keys of its section."""
+    own = studio_performance(take).model_dump(mode="json", include=set(keys))
+    return {key: value for key, value in own.items() if value is not None}
 
 
 def studio_camera_values(take):
     """Where the cameras of a take stand and what they see."""
-    own = studio_performance(take).model_dump(mode="json", include=set(STUDIO_OWN_CAMERA_KEYS))
-    given = {key: value for key, value in own.items() if value is not None}
-    return studio_values(STUDIO_CAMERA_KEYS) | given
+    return studio_values(STUDIO_CAMERA_KEYS) | studio_own(take, STUDIO_OWN_CAMERA_KEYS)
 
 
 def studio_csv(take):

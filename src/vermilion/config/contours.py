@@ -35,6 +35,12 @@ class TrackRidgeConfig(StageConfig):
         le=500,
         description="Frames of a take from which its lip borders are learnt, evenly spaced (count).",
     )
+    span: int = Field(
+        240,
+        ge=0,
+        description="Where dense landmarks are the start, a take of fewer frames is learnt from frames of its "
+        "source before and after it, too, as far as there are no cuts: so many in all (count); 0: from its own.",
+    )
     reach: float = Field(
         0.08,
         gt=0,

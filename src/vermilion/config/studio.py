@@ -62,6 +62,18 @@ class StudioTake(StageConfig):
         le=1000,
         description="Height that the video camera sees at the face (mm); empty: that of all takes.",
     )
+    head_turn_deg: float | None = Field(
+        None,
+        ge=0,
+        le=30,
+        description="Largest turn of the head in the take (degrees); empty: that of all takes.",
+    )
+    head_shift_mm: float | None = Field(
+        None,
+        ge=0,
+        le=30,
+        description="Largest shift of the head in the take (mm); empty: that of all takes.",
+    )
     video_size_px: tuple[int, int] | None = Field(
         None,
         description="Width and height of the take's images, of `video` takes only (px); empty: those of all takes.",
@@ -159,10 +171,10 @@ class StudioConfig(StageConfig):
         1.0, gt=0, le=1.5, description="Scale of generated expressions (1: full weights)."
     )
     head_turn_deg: float = Field(
-        2.5, ge=0, le=20, description="Largest turn of the head during a take (degrees)."
+        2.5, ge=0, le=30, description="Largest turn of the head during a take (degrees)."
     )
     head_shift_mm: float = Field(
-        2.0, ge=0, le=20, description="Largest shift of the head during a take (mm)."
+        2.0, ge=0, le=30, description="Largest shift of the head during a take (mm)."
     )
     occlusion_directions: int = Field(
         192,

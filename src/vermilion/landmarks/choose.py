@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vermilion.landmarks.descent import DescentDetector
-from vermilion.landmarks.detector import LandmarkDetector
+from vermilion.landmarks.detector import LandmarkDetector, Landmarks
 from vermilion.landmarks.mediapipe import MediapipeDetector, environment_python
 from vermilion.landmarks.networks import NetworkDetector, NetworkSettings
+from vermilion.landmarks.sets import LandmarkSet
+from vermilion.landmarks.table import GivenLandmarks
 from vermilion.storage.errors import InputError
 
 
@@ -27,6 +32,36 @@ def open_detector(kind: str, model: str, networks: dict[str, Any]) -> LandmarkDe
     if kind == "trained":
         return DescentDetector.load(model)
     raise ValueError(f"no detector '{kind}' that works on images")
+
+
+#: Faces in a frame of a number, given its image (h, w, 3) linear RGB, or None where it could not be read.
+FindFaces = Callable[[int, np.ndarray | None], list[Landmarks]]
+
+
+def face_finder(
+    kind: str, model: str, networks: dict[str, Any], files: dict[str, Any], file: str
+) -> tuple[FindFaces, LandmarkSet]:
+    """What finds the faces of a take's frames, and the set of their landmarks.
+
+    Args:
+        kind: `files`: those that another tracker wrote to `file`; else as of `open_detector`.
+        model, networks: as of `open_detector`.
+        files: settings of `files`.
+    """
+    if kind == "files":
+        table = GivenLandmarks(**{**files, "path": file}).read()
+
+        def given(frame: int, image: np.ndarray | None) -> list[Landmarks]:
+            found = table.at(frame)
+            return [found] if found.found else []
+
+        return given, table.landmark_set
+    detector = open_detector(kind, model, networks)
+
+    def detected(frame: int, image: np.ndarray | None) -> list[Landmarks]:
+        return [] if image is None else detector.faces(image)
+
+    return detected, detector.landmark_set
 
 
 def usable_kind(kind: str, environment: str, models: str, training: bool) -> tuple[str, str]:

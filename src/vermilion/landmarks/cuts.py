@@ -42,7 +42,8 @@ class FrameLooks:
     @classmethod
     def of(cls, looks: list[tuple[np.ndarray, np.ndarray]]) -> FrameLooks:
         """Of `looks`, thumbnail (18, 32, 3) and colours (216,) of each frame, as `frame_look` gives them."""
-        return cls(np.stack([t for t, _ in looks]), np.stack([c for _, c in looks]))
+        thumbnails = np.array([t for t, _ in looks], np.uint8).reshape(-1, *THUMBNAIL[::-1], 3)
+        return cls(thumbnails, np.array([c for _, c in looks], np.float32).reshape(-1, _COLOURS))
 
     @property
     def known(self) -> np.ndarray:

@@ -112,19 +112,24 @@ class LandmarkTrack:
 
     @classmethod
     def of(
-        cls, frames: Sequence[int], found: Sequence[Landmarks], piece: np.ndarray | None = None
+        cls,
+        frames: Sequence[int],
+        found: Sequence[Landmarks],
+        piece: np.ndarray | None = None,
+        landmark_set: LandmarkSet = IBUG66,
     ) -> LandmarkTrack:
-        """One entry a frame, all of one set; `piece` (F,) as in the attributes."""
+        """One entry a frame, all of one set: `landmark_set` where there is none; `piece` (F,) as above."""
+        kind = found[0].landmark_set if len(found) else landmark_set
         depth = None
         if any(entry.depth_px is not None for entry in found):
-            unknown = np.full(len(found[0].points_px), np.nan)
+            unknown = np.full(kind.n_points, np.nan)
             depth = np.stack([unknown if e.depth_px is None else e.depth_px for e in found])
         return cls(
             np.asarray(frames, dtype=np.int64),
-            np.stack([entry.points_px for entry in found]),
-            np.stack([entry.confidence for entry in found]),
+            np.array([entry.points_px for entry in found]).reshape(-1, kind.n_points, 2),
+            np.array([entry.confidence for entry in found]).reshape(-1, kind.n_points),
             np.array([entry.found for entry in found], dtype=bool),
-            found[0].landmark_set if len(found) else IBUG66,
+            kind,
             depth,
             piece,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,12 +58,45 @@ class SeenFaces:
     @classmethod
     def load(cls, paths: Sequence[str | Path]) -> SeenFaces:
         """Read what `FaceFinds.save` wrote, of all chunks of a take; landmarks are left alone."""
-        names = ("frames", "thumbnails", "colours", "reasons", "image_size_px", *_PER_FACE)
-        parts = [read_arrays(path, "file of faces", names) for path in paths]
-        joined = {n: np.concatenate([p[n] for p in parts]) for n in names if n != "image_size_px"}
-        looks = FrameLooks(joined.pop("thumbnails"), joined.pop("colours"))
-        size = np.max([part["image_size_px"] for part in parts], axis=0)
-        return cls(looks=looks, image_size_px=size, **joined)
+        names = ("thumbnails", "colours", *_PER_TAKE, *_PER_FACE)
+        parts = []
+        for path in paths:
+            arrays = read_arrays(path, "file of faces", names)
+            looks = FrameLooks(arrays["thumbnails"], arrays["colours"])
+            parts.append(cls(looks=looks, **{n: arrays[n] for n in (*_PER_TAKE, *_PER_FACE)}))
+        return cls.joined(parts)
+
+    @classmethod
+    def joined(cls, parts: Sequence[SeenFaces]) -> SeenFaces:
+        """The faces of frames that no two of the parts share, in order of frame."""
+        frames = np.concatenate([part.frames for part in parts])
+        order = np.argsort(frames, kind="stable")
+        frame = np.concatenate([part.frame for part in parts])
+        face_order = np.argsort(frame, kind="stable")
+        faces = {
+            n: np.concatenate([getattr(p, n) for p in parts])[face_order]
+            for n in _PER_FACE
+        }  # fmt: skip
+        thumbnails = np.concatenate([part.looks.thumbnails for part in parts])[order]
+        colours = np.concatenate([part.looks.colours for part in parts])[order]
+        return cls(
+            frames=frames[order],
+            looks=FrameLooks(thumbnails, colours),
+            reasons=np.concatenate([part.reasons for part in parts])[order],
+            image_size_px=np.max([part.image_size_px for part in parts], axis=0),
+            **faces,
+        )
+
+    def of_frames(self, frames: Sequence[int]) -> SeenFaces:
+        """The faces of some of the frames."""
+        rows, faces = np.isin(self.frames, frames), np.isin(self.frame, frames)
+        return replace(
+            self,
+            frames=self.frames[rows],
+            looks=FrameLooks(self.looks.thumbnails[rows], self.looks.colours[rows]),
+            reasons=self.reasons[rows],
+            **{name: getattr(self, name)[faces] for name in _PER_FACE},
+        )
 
 
 @dataclass(frozen=True)
@@ -88,39 +121,49 @@ class FaceFinds:
     landmark_set: LandmarkSet
     image_size_px: tuple[int, int]
 
-    def save(self, path: str | Path) -> None:
-        """Write `.npz`, whole or not at all."""
-        flat = [face for faces in self.faces for face in faces]
-        n_points = self.landmark_set.n_points
-        points = np.array([f.points_px for f in flat]).reshape(-1, n_points, 2)
-        compact = np.array([f.as_ibug66().points_px for f in flat]).reshape(-1, 66, 2)
-        depth = [np.zeros(n_points) if f.depth_px is None else f.depth_px for f in flat]
-        depths = np.array(depth).reshape(-1, n_points)
-        low, high, size = compact.min(axis=1), compact.max(axis=1), face_size_px(compact)
-        deep = depths[:, self.landmark_set.ibug66]
-        shape = np.concatenate([compact, deep[..., None]], axis=-1)
+    def seen(self) -> SeenFaces:
+        """The same faces without their landmarks."""
+        flat, ids = [face for faces in self.faces for face in faces], self.landmark_set.ibug66
+        points = np.array([f.as_ibug66().points_px for f in flat]).reshape(-1, N_LANDMARKS, 2)
+        deep = [np.zeros(N_LANDMARKS) if f.depth_px is None else f.depth_px[ids] for f in flat]
+        low, high, size = points.min(axis=1), points.max(axis=1), face_size_px(points)
+        depths = np.array(deep).reshape(-1, N_LANDMARKS, 1)
+        shape = np.concatenate([points, depths], axis=-1)
         shape = (shape - shape.mean(axis=1, keepdims=True)) / size[:, None, None]
-        arrays: dict[str, Any] = {}
-        if any(f.depth_px is not None for f in flat):
-            arrays["depth_px"] = depths
-        confidence = np.array([f.confidence for f in flat]).reshape(-1, n_points)
-        write_arrays(
-            path,
+        sure = [face.confidence.mean() for face in flat]
+        return SeenFaces(
             frames=self.frames,
-            thumbnails=self.looks.thumbnails,
-            colours=self.looks.colours,
+            looks=self.looks,
             reasons=np.array(self.reasons, dtype=str),
-            image_size_px=np.array(self.image_size_px),
             frame=np.repeat(self.frames, [len(faces) for faces in self.faces]),
             centre_px=0.5 * (low + high),
             size_px=size,
-            eyes_px=interocular_px(compact),
+            eyes_px=interocular_px(points),
             sharp_eyes_px=np.array([px for row in self.sharp_eyes_px for px in row], dtype=float),
-            sureness=confidence.mean(axis=1),
+            sureness=np.array(sure, dtype=float),
             shape=shape.astype(np.float32),
-            points_px=points,
-            confidence=confidence,
+            image_size_px=np.array(self.image_size_px),
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write `.npz`, whole or not at all."""
+        flat, n_points = (
+            [face for faces in self.faces for face in faces],
+            self.landmark_set.n_points,
+        )
+        arrays: dict[str, Any] = {}
+        if any(f.depth_px is not None for f in flat):
+            depth = [np.zeros(n_points) if f.depth_px is None else f.depth_px for f in flat]
+            arrays["depth_px"] = np.array(depth).reshape(-1, n_points)
+        seen = self.seen()
+        write_arrays(
+            path,
+            thumbnails=seen.looks.thumbnails,
+            colours=seen.looks.colours,
+            points_px=np.array([f.points_px for f in flat]).reshape(-1, n_points, 2),
+            confidence=np.array([f.confidence for f in flat]).reshape(-1, n_points),
             landmark_set=np.array(self.landmark_set.name),
+            **{name: getattr(seen, name) for name in (*_PER_TAKE, *_PER_FACE)},
             **arrays,
         )
 
@@ -152,6 +195,7 @@ class FaceFinds:
         return cls(frames, faces, looks, reasons, sharp, kind, (width, height))
 
 
+_PER_TAKE = ("frames", "reasons", "image_size_px")
 _PER_FACE = ("frame", "centre_px", "size_px", "eyes_px", "sharp_eyes_px", "sureness", "shape")
 
 

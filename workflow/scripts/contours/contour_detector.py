@@ -55,8 +55,12 @@ def main(snakemake) -> None:
         )
     if cfg.kind in ("auto", "track"):
         rings = LandmarkRings(found) if dense else TrackedRings(snakemake.input, track)
+        more = snakemake.input.around and LandmarkTrack.load(
+            [*snakemake.input.landmarks, snakemake.input.around], None
+        )
+        seen = LandmarkRings(more) if more else rings
         by_track = detector_from_rings(
-            cfg, lambda frame: source.read(camera, frame), found, rings, rings.frames, dense
+            cfg, lambda frame: source.read(camera, frame), more or found, seen, seen.frames, dense
         )
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)
