@@ -22,12 +22,14 @@ from vermilion.imaging.images import write_srgb8
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.quality import QualityRow, write_quality
 from vermilion.storage.sequences import write_sequence
+from vermilion.storage.tables import write_table
 from vermilion.tracking.result import Identity, TrackedTake
 
 N_FRAMES, CHUNK = 40, 20
 CHUNKS = ["000000-000019", "000020-000039"]
 TRAIN, TEST = range(0, 30), range(30, 40)
 BAD_FRAME = 5  # the tracker says that it lost this one
+LOST = {19: 0.5, 20: 0.7}  # frame -> how unlike the neutral's pattern that of the lips is; else 0.2
 ACTIVE = (
     "jawOpen", "mouthPucker", "mouthSmile_L", "mouthSmile_R", "mouthRollUpper", "mouthRollLower",
     "mouthFunnel",
@@ -112,6 +114,11 @@ def write_subject(root: Path, subject: str, accurate: FaceModel, tracker: FaceMo
         write_sequence(folder / f"multiview/H/{chunk}.npy", high[part])
         rows = [QualityRow(frame) for frame in range(first, last + 1)]
         write_quality(folder / f"multiview/quality/{chunk}.tsv", subject, "rom", "multiview", rows)
+        drift = [
+            {"frame": f, "camera": "all", "difference_vermilion": LOST.get(f, 0.2)}
+            for f in frames[part]
+        ]
+        write_table(_made(folder / f"multiview/drift/{chunk}.tsv"), drift)
         np.savez(
             _made(folder / f"features/{chunk}.npz"), frames=frames[part],
             features=features[part], names=np.array(names), valid=np.ones(last + 1 - first, bool),

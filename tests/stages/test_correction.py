@@ -5,11 +5,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.stages.lip_scene import BAD_FRAME, CHUNKS, N_FRAMES, TEST, TRAIN, models, write_subject
+from tests.stages.lip_scene import (
+    BAD_FRAME,
+    CHUNKS,
+    LOST,
+    N_FRAMES,
+    TEST,
+    TRAIN,
+    models,
+    write_subject,
+)
 from tests.stages.run_script import run_script
 from vermilion.config.correction import LayersConfig
 from vermilion.config.correspondence import CorrespondenceConfig
 from vermilion.config.database import DatabaseConfig
+from vermilion.config.multiview import LostConfig
 from vermilion.config.training import TrainingConfig
 from vermilion.correction.coarse_take import CoarseTake
 from vermilion.correction.correct import CorrectionSettings, correct, correct_with_layers
@@ -76,12 +86,16 @@ def run_layers(root, subject, chunk):
         "correction/layers",
         wildcards={"subject": subject, "take": "rom", "chunk": chunk},
         params={
-            "cfg": {"correction.layers": LayersConfig().model_dump()},
+            "cfg": {
+                "correction.layers": LayersConfig().model_dump(),
+                "multiview.lost": LostConfig().model_dump(),
+            },
             "frames": list(range(first, last + 1)),
         },
         input={
             "accurate": take / f"multiview/H/{chunk}.npy",
             "accurate_quality": take / f"multiview/quality/{chunk}.tsv",
+            "drift": [take / f"multiview/drift/{c}.tsv" for c in CHUNKS],
             "accurate_neutral": take / "multiview/neutral.npz",
             "coarse": take / f"tracking/C/{chunk}.npy",
             "fit": take / "tracking/fit.npz",
@@ -258,9 +272,13 @@ def test_regressors_correct_held_out_frames(scene, subject, regressor):
 def test_a_lost_frame_is_flagged_and_trains_nothing(scene):
     quality = read_table(scene.root / f"takes/ana/rom/correction/quality/{CHUNKS[0]}.tsv")
     flagged = quality[quality["valid"] == 0]
-    assert flagged["frame"].tolist() == [BAD_FRAME]
-    assert flagged["reason"].tolist() == ["the coarse track failed"]
-    assert BAD_FRAME not in load_model(scene.root / "models/MS.h5").training_frames["ana/rom"]
+    before, after = sorted(LOST)  # one chunk's last and the next one's first
+    assert flagged["frame"].tolist() == [BAD_FRAME, before]
+    tracked, followed = flagged["reason"]
+    assert tracked == "the coarse track failed"
+    assert followed.startswith("the lips' pattern differs from the neutral's by 0.50")
+    trained = load_model(scene.root / "models/MS.h5").training_frames["ana/rom"]
+    assert not {BAD_FRAME, before, after} & set(trained)
 
 
 def test_training_sees_neither_held_out_frames_nor_other_people(scene):
@@ -270,7 +288,7 @@ def test_training_sees_neither_held_out_frames_nor_other_people(scene):
         assert {name.split("/")[0] for name in model.training_frames} == people
         for frames in model.training_frames.values():
             assert not set(frames) & set(TEST)
-            assert len(frames) == len(TRAIN) - 1
+            assert len(frames) == len(TRAIN) - 1 - len(LOST)
 
 
 def test_variants_read_their_own_features(scene):
@@ -301,11 +319,11 @@ def test_database_tells_split_and_validity(scene):
         entry = database.read_take("ana", "rom")
         assert entry.fps == 30.0
         np.testing.assert_array_equal(entry.frames[entry.train], list(TRAIN))
-        assert entry.frames[~entry.valid].tolist() == [BAD_FRAME]
+        assert entry.frames[~entry.valid].tolist() == [BAD_FRAME, *LOST]
         assert entry.layers.shape == (N_FRAMES, len(database.mask), 9)
         data = database.training_set(["bo"])
         assert data.takes == ("bo/rom",)
-        assert data.layers.shape == (len(TRAIN) - 1, 9 * len(database.mask))
+        assert data.layers.shape == (len(TRAIN) - 1 - len(LOST), 9 * len(database.mask))
 
 
 def test_the_same_inputs_write_the_same_bytes(scene):

@@ -6,6 +6,7 @@ rule layers:
     input:
         accurate=P.accurate,
         accurate_quality=P.multiview_quality,
+        drift=per_chunk(P.drift),
         accurate_neutral=P.neutral,
         coarse=P.coarse,
         fit=P.fit,
@@ -23,7 +24,7 @@ rule layers:
         mem_mb=growing(1500),
         runtime=growing(20),
     params:
-        cfg=cfg_of("correction.layers"),
+        cfg=cfg_of("correction.layers", "multiview.lost"),
         code=code_of("correction/layers"),
         frames=chunk_frames,
     script:

@@ -95,6 +95,7 @@ rule lip_shapes:
         correspondence=expand(P.correspondence, subject=trained_subjects()),
         accurate=of_takes(P.accurate, takes_that_train()),
         accurate_quality=of_takes(P.multiview_quality, takes_that_train()),
+        drift=of_takes(P.drift, takes_that_train()),
         neutrals=of_takes(P.neutral, takes_that_train()),
     output:
         shapes=P.lip_shapes,
@@ -106,7 +107,7 @@ rule lip_shapes:
         mem_mb=growing(3000),
         runtime=growing(30),
     params:
-        cfg=cfg_of("evaluation.contour"),
+        cfg=cfg_of("evaluation.contour", "multiview.lost"),
         code=code_of("evaluation/lip_shapes"),
         subjects=trained_subjects(),
         takes=[

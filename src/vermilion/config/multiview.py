@@ -226,6 +226,22 @@ class DriftConfig(StageConfig):
     )
 
 
+class LostConfig(StageConfig):
+    """Frames in which the mesh lost the lips: their pattern differs from the neutral's. They train nothing."""
+
+    difference: float = Field(
+        0.6,
+        gt=0.0,
+        le=2.0,
+        description="A frame whose lips differ by more is lost (local deviations; 0: the same pattern, 1.1: "
+        "unrelated ones).",
+    )
+    near_difference: float = Field(
+        0.4, gt=0.0, le=2.0,
+        description="So are the frames before and after it, up to the first whose lips differ by less.",
+    )  # fmt: skip
+
+
 class ReportConfig(StageConfig):
     """The report page of a take."""
 
@@ -270,6 +286,7 @@ class MultiviewConfig(StageConfig):
     track: TrackConfig = section(TrackConfig, "Coarse track with anchor frames (Beeler 2011).")
     refine: RefineConfig = section(RefineConfig, "Registration of each frame to the neutral.")
     drift: DriftConfig = section(DriftConfig, "Drift of each frame against the neutral.")
+    lost: LostConfig = section(LostConfig, "Frames in which the mesh lost the lips.")
     report: ReportConfig = section(ReportConfig, "The report page of a take.")
 
     @model_validator(mode="after")

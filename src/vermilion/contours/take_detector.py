@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from vermilion.contours.lip_heights import LEAST_FRAMES
 from vermilion.contours.track_ridge import TrackRidgeDetector, learn_from_take
 from vermilion.landmarks.detector import LandmarkTrack
 from vermilion.storage.frames import evenly_taken
@@ -21,6 +22,7 @@ def detector_from_rings(
     rings: Rings,
     frames: list[int],
     dense: bool,
+    around: Sequence[int] = (),
 ) -> TrackRidgeDetector | None:
     """The detector that a take's own images and rings of its lips tell; None where no frame serves.
 
@@ -29,10 +31,12 @@ def detector_from_rings(
         read: frame -> image (h, w, 3) linear RGB.
         landmarks: of the take, of any set.
         rings: of its frames.
-        frames: numbers of those that have rings; it is learnt from some of them.
+        frames: numbers of those of the take that have rings; it is learnt from some of them.
         dense: whether the rings are those of dense landmarks, else of the tracked lips.
+        around: numbers of frames before and after the take that have rings; it is learnt from all of them.
     """
     options, track = section.track, landmarks.as_ibug66()
+    own = max(options.frames - len(around), min(options.frames, LEAST_FRAMES))
     points = dict(zip(track.frames.tolist(), track.points_px, strict=True))
     detector = TrackRidgeDetector.of(
         section, section.lips_reach if dense else options.inner_reach,
@@ -42,7 +46,7 @@ def detector_from_rings(
     )  # fmt: skip
     return learn_from_take(
         detector,
-        sorted(evenly_taken(frames, options.frames)),
+        sorted({*around, *evenly_taken(frames, own)}),
         read,
         points.__getitem__,
         rings,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -107,14 +107,15 @@ def quality_rows(
     frames: Sequence[int],
     *,
     tracked: np.ndarray,
-    reconstructed: np.ndarray,
     max_alignment_mm: float,
+    failed: Mapping[int, str] | None = None,
 ) -> tuple[TakeLayers, list[QualityRow]]:
     """Flag the frames that no regressor may learn from, with the reason.
 
     Args:
-        tracked, reconstructed: (F,) bool, what the earlier stages say of C and H.
+        tracked: (F,) bool, what the tracking says of C.
         max_alignment_mm: of the aligned regions against each other (RMS).
+        failed: frame -> why H is not to be learnt from; None: of no frame.
 
     Returns:
         (layers with `valid` narrowed, a row a frame).
@@ -124,8 +125,8 @@ def quality_rows(
         reason = ""
         if not tracked[k]:
             reason = "the coarse track failed"
-        elif not reconstructed[k]:
-            reason = "the accurate mesh failed"
+        elif failed and frame in failed:
+            reason = failed[frame]
         elif not made.valid[k]:
             reason = "a mesh with vertices that are not finite"
         elif made.alignment_mm[k] > max_alignment_mm:

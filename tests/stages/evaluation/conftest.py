@@ -25,6 +25,7 @@ from vermilion.config.evaluation import (
     MeasuresConfig,
     ReferenceConfig,
 )
+from vermilion.config.multiview import LostConfig
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.storage.arrays import read_arrays, write_arrays
 from vermilion.storage.sequences import write_sequence
@@ -38,6 +39,7 @@ CFG = {
     "evaluation.reference": ReferenceConfig().model_dump(),
     "evaluation.measures": MeasuresConfig(bootstrap_samples=200).model_dump(),
     "evaluation.measures.surface": MeasuresConfig().surface.model_dump(),
+    "multiview.lost": LostConfig().model_dump(),
     "evaluation.contour": ContourConfig(shapes=8).model_dump(),
     "evaluation.figures": EvaluationConfig().figures.model_dump() | {"map_size_px": 120},
     "evaluation.figures.map_frames": 2,
@@ -115,6 +117,7 @@ def run_lip_shapes(root):
             "accurate_quality": [
                 take / f"multiview/quality/{c}.tsv" for take in takes for c in CHUNKS
             ],
+            "drift": [take / f"multiview/drift/{c}.tsv" for take in takes for c in CHUNKS],
             "neutrals": [take / "multiview/neutral.npz" for take in takes],
         },
         output={"shapes": root / "evaluation/lip_shapes.npz"},

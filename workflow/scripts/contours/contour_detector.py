@@ -55,12 +55,14 @@ def main(snakemake) -> None:
         )
     if cfg.kind in ("auto", "track"):
         rings = LandmarkRings(found) if dense else TrackedRings(snakemake.input, track)
-        more = snakemake.input.around and LandmarkTrack.load(
-            [*snakemake.input.landmarks, snakemake.input.around], None
-        )
-        seen = LandmarkRings(more) if more else rings
+        own, around, seen = rings.frames, [], found
+        if snakemake.input.around:
+            beyond = LandmarkTrack.load(snakemake.input.around, None)
+            around = beyond.frames[beyond.valid].tolist()
+            seen = LandmarkTrack.load([*snakemake.input.landmarks, snakemake.input.around], None)
+            rings = LandmarkRings(seen)
         by_track = detector_from_rings(
-            cfg, lambda frame: source.read(camera, frame), more or found, seen, seen.frames, dense
+            cfg, lambda frame: source.read(camera, frame), seen, rings, own, dense, around
         )
     if labelled and by_track:
         rows += offset_rows(labelled, by_track, rings)

@@ -8,11 +8,11 @@ from vermilion.correction.take_layers import quality_rows, save_layers, take_lay
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.faces.model import FaceModel
 from vermilion.imaging.images import write_srgb8
+from vermilion.multiview.lost_frames import failed_frames
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.quality import write_quality
 from vermilion.storage.sequences import read_sequence
-from vermilion.storage.tables import read_table
 from vermilion.tracking.result import TrackedTake
 
 
@@ -24,8 +24,9 @@ def main(snakemake):
     place = {"subject": snakemake.wildcards.subject, "take": snakemake.wildcards.take}
     neutral = read_arrays(inputs.accurate_neutral, "neutral", ("vertices_mm",), **place)
     neutral_mm = neutral["vertices_mm"].astype(np.float64)
-    reconstructed = read_table(inputs.accurate_quality, ["frame", "valid"])
-    bad = set(reconstructed.loc[reconstructed["valid"] == 0, "frame"])
+    failed = failed_frames(
+        [inputs.accurate_quality], inputs.drift, snakemake.params.cfg["multiview.lost"]
+    )
     made = take_layers(
         correspondence,
         read_sequence(inputs.accurate),
@@ -39,7 +40,7 @@ def main(snakemake):
         made,
         frames,
         tracked=fit.valid[rows],
-        reconstructed=np.array([frame not in bad for frame in frames]),
+        failed=failed,
         max_alignment_mm=cfg.max_alignment_mm,
     )
     write_srgb8(output.overlay, layers_overlay(correspondence, checked, frames))

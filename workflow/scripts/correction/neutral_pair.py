@@ -1,7 +1,5 @@
 """Coarse and accurate neutral of a take, one laid on the other, with the image of their layer."""
 
-import numpy as np
-
 from vermilion.config.correction import LayersConfig
 from vermilion.correction.neutral_pair import NeutralPair
 from vermilion.correction.overlay import layers_overlay
@@ -36,7 +34,6 @@ def main(snakemake):
         made,
         [frame],
         tracked=fit.valid[row],
-        reconstructed=np.ones(1, dtype=bool),
         max_alignment_mm=cfg.max_alignment_mm,
     )
     found = read_chunks(inputs.features, [frame], ["features", "valid"])

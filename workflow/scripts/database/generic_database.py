@@ -36,7 +36,6 @@ def layers_of(take, files, correspondence, face, cfg):
         made,
         fit.frames,
         tracked=fit.valid,
-        reconstructed=np.ones(len(fit.frames), dtype=bool),
         max_alignment_mm=cfg.max_alignment_mm,
     )
     for row in rows:

@@ -7,19 +7,15 @@ import numpy as np
 from vermilion.baselines.lip_shapes import PosedTake, choose_lip_shapes
 from vermilion.correspondence.correspondence import Correspondence
 from vermilion.faces.model import FaceModel
+from vermilion.multiview.lost_frames import failed_frames
 from vermilion.provenance.begun_run import begin_job
 from vermilion.storage.arrays import read_arrays
 from vermilion.storage.chunks import read_frames
 from vermilion.storage.progress import progress
-from vermilion.storage.tables import read_table
 
 
-def posed(take, chunks, qualities, neutral, correspondence):
+def posed(take, chunks, bad, neutral, correspondence):
     """The frames of a take that train and were reconstructed."""
-    bad = set()
-    for path in qualities:
-        table = read_table(path, ["frame", "valid"])
-        bad |= set(table.loc[table["valid"] == 0, "frame"])
     frames = np.array([frame for frame in take["train"] if frame not in bad], dtype=int)
     at_rest = read_arrays(neutral, f"neutral of {take['take']}", ("vertices_mm",))["vertices_mm"]
     return PosedTake.of(take["take"], frames, read_frames(chunks, frames), at_rest, correspondence)
@@ -30,11 +26,12 @@ def main(snakemake):
     people = dict(
         zip(params.subjects, map(Correspondence.load, inputs.correspondence), strict=True)
     )
-    accurate, quality = iter(inputs.accurate), iter(inputs.accurate_quality)
+    files = [iter(inputs[name]) for name in ("accurate", "accurate_quality", "drift")]
     takes = []
     for take, neutral in progress(list(zip(params.takes, inputs.neutrals, strict=True)), "takes"):
-        files = [[next(paths) for _ in range(take["chunks"])] for paths in (accurate, quality)]
-        takes.append(posed(take, *files, neutral, people[take["take"].split("/")[0]]))
+        chunks, *told = ([next(paths) for _ in range(take["chunks"])] for paths in files)
+        bad = failed_frames(*told, params.cfg["multiview.lost"])
+        takes.append(posed(take, chunks, bad, neutral, people[take["take"].split("/")[0]]))
     model = FaceModel.load(inputs.tracker)
     lips = model.regions["vermilion_upper"] | model.regions["vermilion_lower"]
     mask = reduce(np.intersect1d, (person.mask for person in people.values()))
