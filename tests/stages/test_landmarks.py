@@ -73,7 +73,7 @@ def find(root, frames, params, face=(), **inputs):
         "landmarks/landmarks_faces",
         wildcards=wildcards,
         params=camera | {"frames": frames},
-        input=inputs,
+        input={"files": [], **inputs},
         output={"faces": faces},
     )
     run_script(
@@ -95,6 +95,29 @@ def find(root, frames, params, face=(), **inputs):
         },
     )
     return LandmarkTrack.load(root / "out.npz"), read_table(root / "out.tsv")
+
+
+def test_landmarks_around_a_short_take_are_those_of_its_face(stage):
+    """Frames 0 and 1 are the take; of the source's others the damaged one has no face."""
+    root, truth = stage
+    params = parameters(root)
+    find(root, [0, 1], params)
+    more = {"landmarks.following": section()["following"] | {"least_eyes_px": 0.0}}
+    more |= {f"contours.detector.track.{key}": 100 for key in ("span", "frames")}
+    own = {"cfg": params["cfg"] | more, "camera": "cam", "frames": [0, 1], "face": ()}
+    run_script(
+        "landmarks/landmarks_around",
+        wildcards={"subject": "a", "take": "t"},
+        params=params | own | {"source_frames": [0, N_FRAMES - 1]},
+        input={"files": [], "faces": [root / "faces.npz"], "followed": root / "followed.npz"},
+        output={"landmarks": root / "around.npz"},
+    )
+    around = LandmarkTrack.load(root / "around.npz")
+    others = [frame for frame in range(N_FRAMES) if frame not in (0, 1)]
+    assert around.frames.tolist() == others
+    assert around.frames[~around.valid].tolist() == [2]
+    seen = np.array(others)[around.valid]
+    assert np.abs(around.points_px[around.valid] - truth[seen]).mean() < 4.0  # px
 
 
 def test_landmarks_are_found_and_a_damaged_image_is_flagged(stage):
