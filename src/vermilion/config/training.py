@@ -50,12 +50,12 @@ class TrainingConfig(StageConfig):
         "features scaled to a total variance of 1.",
     )
     affine_alphas: list[Positive] = Field(
-        [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0],
+        [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0],
         min_length=1,
         description="Tikhonov parameters of the affine regressor that cross-validation tries.",
     )
     kernel_alphas: list[Positive] = Field(
-        [1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0],
+        [1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0],
         min_length=1,
         description="Noise variances of the kernel regressor that cross-validation tries.",
     )

@@ -43,8 +43,11 @@ class Selection:
     scaling: Literal["group", "feature"] = "group"
     alphas: Sequence[float] = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
     betas: Sequence[float] = (0.01, 0.03, 0.1, 0.3, 1.0)
-    affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
-    kernel_alphas: Sequence[float] = (1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0)
+    affine_alphas: Sequence[float] = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0)
+    kernel_alphas: Sequence[float] = (
+        *(1e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0),
+        *(3.0, 10.0, 30.0, 100.0, 300.0),
+    )
     kernel_betas: Sequence[float] = (0.1, 0.3, 1.0, 3.0)
     kernel_linear: float = 1.0
     kernel_equalise: float = 0.5
