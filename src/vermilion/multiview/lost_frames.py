@@ -28,7 +28,7 @@ def failed_frames(
         drift: as of `lost_frames`.
         lost: section `multiview.lost` of the configuration.
     """
-    failed = {}
+    failed: dict[int, str] = {}
     for path in quality:
         table = read_table(path, ["frame", "valid"])
         failed |= dict.fromkeys(table.loc[table["valid"] == 0, "frame"], "the accurate mesh failed")
