@@ -155,7 +155,7 @@ def peer(corrector: Corrector, coarse: np.ndarray, features: np.ndarray, triangl
 
 def settings_of(detail_mm: float) -> CorrectionSettings:
     """Without the image and without a filter over time."""
-    return CorrectionSettings(seam_mm=16.0, detail_mm=detail_mm, smooth_frames=0, image=None)
+    return CorrectionSettings(16.0, detail_mm, smooth_frames=0, fade_power=0.0, image=None)
 
 
 def take_of(

@@ -220,7 +220,7 @@ def take_of(scene, subject):
 def corrected_by(scene, subject, regressor):
     model = load_model(scene.root / f"models/{regressor}.h5")
     take = take_of(scene, subject)
-    return correct(model, take, CorrectionSettings(16.0, 0.0, 0, None))
+    return correct(model, take, CorrectionSettings(16.0, 0.0, 0, 0.0, None))
 
 
 def corrected_by_truth(scene, subject):
@@ -228,7 +228,9 @@ def corrected_by_truth(scene, subject):
     folder = scene.root / f"takes/{subject}/rom/correction/layers"
     layers = np.concatenate([np.load(folder / f"{c}.npz")["layers"] for c in CHUNKS])
     take = take_of(scene, subject)
-    return correct_with_layers(mask, layers, None, take, CorrectionSettings(16.0, 0.0, 0, None))
+    return correct_with_layers(
+        mask, layers, None, take, CorrectionSettings(16.0, 0.0, 0, 0.0, None)
+    )
 
 
 def test_correspondence_covers_the_mouth_and_is_near(scene):

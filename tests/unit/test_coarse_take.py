@@ -11,7 +11,9 @@ from vermilion.correction.correct import CorrectionSettings, correct_with_layers
 
 FACE = lip_patch.face_model()
 MASK = np.flatnonzero((FACE.triangles < 22 * lip_patch.COLUMNS).all(axis=1))
-SETTINGS = CorrectionSettings(seam_mm=0.0, detail_mm=0.0, smooth_frames=0, image=None)
+SETTINGS = CorrectionSettings(
+    seam_mm=0.0, detail_mm=0.0, smooth_frames=0, fade_power=0.0, image=None
+)
 LOST, BROKEN, BLIND = 1, 2, 3
 
 

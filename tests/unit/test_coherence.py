@@ -53,4 +53,4 @@ def test_the_window_is_a_time():
     config = CorrectionConfig()
     frames = [config.integration.at(fps)["smooth_frames"] for fps in (10, 30, 60)]
     assert frames == [0, 3, 6]
-    assert config.reach_frames(30) == 9 + 3
+    assert config.reach_frames(30) == 9 + 18 + 3

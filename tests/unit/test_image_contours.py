@@ -9,7 +9,7 @@ from scipy import sparse
 
 from tests import lip_patch
 from vermilion.baselines.null import null_model
-from vermilion.config.correction import CorrectionConfig
+from vermilion.config.correction import CorrectionConfig, ImageAgreementConfig
 from vermilion.config.evaluation import SurfaceConfig
 from vermilion.correction.coarse_take import CoarseTake, frames_around
 from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
@@ -32,7 +32,7 @@ from vermilion.geometry.rotations import rotation_matrix
 
 N_SAMPLES = 80
 CAMERA = lip_patch.cameras()["front"]
-DEFAULTS = ImageAgreementSettings(**CorrectionConfig().image.model_dump())
+DEFAULTS = ImageAgreementSettings(**CorrectionConfig().image.at(30))
 OFF = replace(DEFAULTS, repose=False, contour_weight=0.0, contact=False)
 CONTOURS = replace(OFF, contour_weight=1000.0)
 REPOSE = replace(OFF, repose=True)
@@ -125,7 +125,7 @@ def test_low_rank_update_is_the_minimum_of_the_whole_energy(bending_mm):
     solver = ConstraintSolver(solid, np.unique(vertices), plate if bending_mm else None)
     forces = solver.forces(rows)
     move = np.zeros((FACE.n_vertices, 3))
-    move[solid.free] = solver.displacements([rows], [forces])[0]
+    move[solid.free] = solver.displacements([solver.pushes(rows, forces)])[0]
     jacobian = sparse.lil_matrix((12, 3 * FACE.n_vertices))
     for i, (pair, shares) in enumerate(zip(vertices, rows.coefficients, strict=True)):
         for vertex, share in zip(pair, shares, strict=True):
@@ -133,7 +133,7 @@ def test_low_rank_update_is_the_minimum_of_the_whole_energy(bending_mm):
     pull = jacobian.T @ ((rows.target_mm - jacobian @ move.ravel()) / rows.compliance)
     balance = (solid.matrix + plate) @ move[solid.free] - pull.reshape(-1, 3)[solid.free]
     assert np.abs(balance).max() < 1e-8
-    near = solver.displacements_at(vertices.ravel(), rows, forces)
+    near = solver.displacements_at(vertices.ravel(), solver.pushes(rows, forces))
     np.testing.assert_allclose(near, move[vertices.ravel()], atol=1e-9)
 
 
@@ -153,7 +153,7 @@ def test_a_pulled_membrane_has_a_tip_and_a_bent_lip_has_none():
         plate = bending_mm**2 * bending_stiffness(FACE.neutral_mm, FACE.triangles, solid.free)
         solver = ConstraintSolver(solid, np.append(around, vertex), plate)
         forces = solver.forces(pull)
-        moved = solver.displacements([pull], [forces])[0][:, 1]
+        moved = solver.displacements([solver.pushes(pull, forces)])[0][:, 1]
         whole = np.zeros(FACE.n_vertices)
         whole[solid.free] = moved
         tips.append(whole[vertex] / whole[around].mean())
@@ -183,7 +183,8 @@ def test_a_one_sided_row_never_pulls():
         np.array([-0.4, 0.3]), np.zeros(2), np.ones(2, dtype=bool),
     )  # fmt: skip
     solver = ConstraintSolver(solid, np.array([vertex]))
-    moved = solver.displacements_at(np.array([vertex]), rows, solver.forces(rows))[0]
+    pushes = solver.pushes(rows, solver.forces(rows))
+    moved = solver.displacements_at(np.array([vertex]), pushes)[0]
     np.testing.assert_allclose(moved, [0.3, 0.0, 0.0], atol=1e-6)
 
 
@@ -251,7 +252,7 @@ def test_points_that_were_not_found_do_not_pull():
 def test_switched_off_the_result_is_that_of_the_paper():
     before = lip_patch.vertices_at(0.6, 0.0)[None]
     layers = np.random.default_rng(1).normal(scale=0.02, size=(1, len(MASK), 9))
-    take, settings = take_of(before, image_of(before)), CorrectionSettings(16.0, 0.0, 0, None)
+    take, settings = take_of(before, image_of(before)), CorrectionSettings(16.0, 0.0, 0, 0.0, None)
     paper = correct_with_layers(MASK, layers, None, take, settings)
     off = correct_with_layers(MASK, layers, None, take, replace(settings, image=OFF))
     on = correct_with_layers(MASK, layers, None, take, replace(settings, image=CONTOURS))
@@ -268,14 +269,14 @@ def test_lips_that_pass_through_each_other_are_parted(weight):
     assert depth_in_other_lip(after) <= 0.01
 
 
-def test_lips_that_touch_in_the_image_touch_in_the_mesh():
+def test_lips_that_touch_in_the_image_touch_there_in_the_mesh():
     gap = FACE.inner_contour[[lip_patch.COLUMNS // 4, 3 * lip_patch.COLUMNS // 4]]
     closed, ajar = lip_patch.vertices_at(-2.35, 0.0), lip_patch.vertices_at(0.5, 0.0)
     ajar[FACE.regions["vermilion_upper"], 2] += 1.0  # and one lip before the other
     settings = replace(OFF, contact=True, contour_weight=100.0)
     after = fitted(ajar[None], image_of([closed]), settings)[0]
     assert np.linalg.norm(ajar[gap[0]] - ajar[gap[1]]) > 2.5
-    assert np.linalg.norm((after[gap[0]] - after[gap[1]])[1:]) < 0.2
+    assert abs(after[gap[0], 1] - after[gap[1], 1]) < 0.2
     assert depth_in_other_lip(after) <= 0.01
 
 
@@ -304,16 +305,18 @@ def test_the_filter_over_time_has_no_lag_and_keeps_what_is_steady():
 
 
 def test_results_do_not_depend_on_the_chunk():
-    settings = replace(DEFAULTS, repose_frames=1.0)
+    """To a hundredth of a millimetre, of lips that jump by millimetres from frame to frame."""
+    config = ImageAgreementConfig(repose_frames=1.0, coherence_s=0.1)
+    settings = ImageAgreementSettings(**config.at(30))
     rng = np.random.default_rng(2)
-    shapes = np.stack([lip_patch.vertices_at(o, 0.05) for o in rng.uniform(0, 4, 16)])
-    image = image_of(shapes + rng.normal(scale=0.3, size=(16, 1, 3)))
+    shapes = np.stack([lip_patch.vertices_at(o, 0.05) for o in rng.uniform(0, 4, 36)])
+    image = image_of(shapes + rng.normal(scale=0.3, size=(36, 1, 3)))
     whole = fitted(shapes, image, settings)
-    asked = np.array([5, 6, 7])
-    near = frames_around(asked, np.arange(16), 3)
-    assert near.tolist() == list(range(2, 11))
+    asked = np.array([17, 18, 19])
+    near = frames_around(asked, np.arange(36), config.reach_frames(30))
+    assert near.tolist() == list(range(17 - 12, 20 + 12))
     part = fitted(shapes[near], image[near], settings, frames=near)[np.searchsorted(near, asked)]
-    np.testing.assert_allclose(part, whole[asked], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(part, whole[asked], rtol=0, atol=0.01)
 
 
 def null_of(take):
@@ -325,7 +328,7 @@ def test_without_a_regressor_the_contours_alone_move_the_lips():
     closed = np.tile(lip_patch.vertices_at(0.6, 0.0), (2, 1, 1))
     image = image_of(np.tile(lip_patch.vertices_at(4.0, 0.5), (2, 1, 1)))
     take = take_of(closed, image)
-    settings = CorrectionSettings(seam_mm=0.0, detail_mm=0.0, smooth_frames=0, image=CONTOURS)
+    settings = CorrectionSettings(0.0, 0.0, smooth_frames=0, fade_power=0.0, image=CONTOURS)
     moved = correct(null_of(take), take, settings)
     before_px, after_px = (distance_px(m, image).mean() for m in (closed[0], moved[0]))
     assert before_px > 0.5 and after_px < 0.3 * before_px, (before_px, after_px)
@@ -337,7 +340,7 @@ def test_without_a_regressor_a_frame_without_features_stays_as_it_is():
     closed = np.tile(lip_patch.vertices_at(0.6, 0.0), (2, 1, 1))
     image = image_of(np.tile(lip_patch.vertices_at(4.0, 0.5), (2, 1, 1)))
     take = replace(take_of(closed, image), features=np.array([[0.0], [np.nan]]))
-    settings = CorrectionSettings(seam_mm=0.0, detail_mm=0.0, smooth_frames=0, image=CONTOURS)
+    settings = CorrectionSettings(0.0, 0.0, smooth_frames=0, fade_power=0.0, image=CONTOURS)
     moved = correct(null_of(take), take, settings)
     assert np.abs(moved[0] - closed[0]).max() > 0.1
     np.testing.assert_array_equal(moved[1], closed[1])

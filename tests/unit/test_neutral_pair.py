@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from vermilion.correction.correct import CorrectionSettings, Corrector
 from vermilion.correction.layers import correction_layers
 from vermilion.correction.neutral_pair import NeutralPair, with_known_neutrals
 from vermilion.geometry.mesh import topology_hash
@@ -189,3 +191,18 @@ def test_round_trip(pair, tmp_path):
     assert (read.subject, read.take, read.reason) == ("eva", "rom", "")
     np.testing.assert_array_equal(read.accurate_mm, pair.accurate_mm)
     np.testing.assert_array_equal(read.features, pair.features)
+
+
+def test_outside_the_training_what_is_regressed_fades_and_inside_it_counts_in_full(model):
+    """Far off, the person's own bias stays, where the regressor alone would go on for ever."""
+    features = np.array(
+        [[0.1, 0.0, 0.2, 0.1], [30.0, 0.0, -20.0, 10.0], [300.0, 0.0, -200.0, 100.0]]
+    )
+    model = replace(model, novelty_limit=1.01 * model.novelty(features[:1], shape(1))[0])
+    settings = CorrectionSettings(16.0, 0.0, smooth_frames=0, fade_power=4.0, image=None)
+    corrector = SimpleNamespace(model=model, neutral_mm=shape(1), settings=settings)
+    share = Corrector._within_span(corrector, features)[:, 0]
+    assert share[0] == 1.0
+    assert share[1] < 0.01 and share[2] < 0.001 * share[1]
+    corrector.settings = settings.as_in_the_paper()
+    np.testing.assert_array_equal(Corrector._within_span(corrector, features), 1.0)

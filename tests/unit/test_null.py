@@ -15,7 +15,9 @@ from vermilion.correction.neutral_pair import NeutralPair, with_known_neutrals
 from .evaluation_face import mouth_triangles, sheet_face
 
 NAMES = ("shape_01", "outer_width")
-SETTINGS = CorrectionSettings(seam_mm=16.0, detail_mm=15.0, smooth_frames=2, image=None)
+SETTINGS = CorrectionSettings(
+    seam_mm=16.0, detail_mm=15.0, smooth_frames=2, fade_power=0.0, image=None
+)
 
 
 @pytest.fixture(scope="module")

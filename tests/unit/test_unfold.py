@@ -63,3 +63,35 @@ def test_a_layer_that_turns_one_lip_over_is_mended_though_the_base_is_elsewhere(
     mended = UNFOLDER.unfold(torn, base)
     assert folded(mended, base) == 0
     assert np.linalg.norm(mended - sound, axis=1).max() < 0.3
+
+
+def flickering(frames):
+    """(meshes (F, V, 3), base (F, V, 3)): a lip that folds in every second frame only, where nothing moves."""
+    base, sound = lip_patch.vertices_at(0.6, 0.0), lip_patch.vertices_at(3.0, 0.04)
+    vertex = middle(sound, FACE.regions["vermilion_lower"])
+    near = adjacency(FACE.triangles, FACE.n_vertices)[[vertex]].indices
+    bulging = sound.copy()
+    bulging[near] += [0.0, 0.0, 0.4]  # of its own, which the base track does not have
+    torn = bulging.copy()
+    torn[vertex] += 3.0 * (sound[near[0]] - sound[vertex])
+    return np.stack([torn if f % 2 else bulging for f in range(frames)]), np.stack([base] * frames)
+
+
+def test_what_is_made_anew_in_some_frames_does_not_tremble():
+    meshes, base = flickering(24)
+    moved = []
+    for reach in (0, 6):
+        mended = UNFOLDER.unfold_over_time(meshes, base, np.arange(24), reach)
+        assert not any(folded(*pair) for pair in zip(mended, base, strict=True))
+        moved.append(np.linalg.norm(np.diff(mended[6:18], n=2, axis=0), axis=2).max())
+    assert moved[1] < 0.1 * moved[0], moved
+
+
+def test_frames_out_of_reach_of_a_fold_stay_as_they_are():
+    meshes, base = flickering(2)
+    meshes, base = np.stack([meshes[1], *[meshes[0]] * 8]), np.stack([base[0]] * 9)
+    mended = UNFOLDER.unfold_over_time(meshes, base, np.arange(9), 4)
+    assert np.array_equal(mended[4:], meshes[4:])
+    assert not np.array_equal(mended[1], meshes[1])
+    across_a_cut = UNFOLDER.unfold_over_time(meshes, base, np.r_[0, 1000 + np.arange(8)], 4)
+    assert np.array_equal(across_a_cut[1:], meshes[1:])

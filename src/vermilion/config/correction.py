@@ -9,6 +9,9 @@ from pydantic import Field
 
 from vermilion.config.base import StageConfig, section
 
+#: Frames to either side that count, per `coherence_s` in frames: one for the unfolding, the rest for the solve.
+_COHERENCE_REACH = 3.0
+
 
 class LayersConfig(StageConfig):
     """Layers of the takes with an accurate mesh (Lips16 4.2)."""
@@ -58,14 +61,23 @@ class IntegrationConfig(StageConfig):
         "frames at 30 a second, none below 20). It removes per-frame noise without lag. 0: no filter, as "
         "in the paper.",
     )
+    fade_power: float = Field(
+        4.0,
+        ge=0.0,
+        le=20.0,
+        description="Outside the training's span (`novelty` above its limit) what is regressed counts by this "
+        "power of limit over novelty; the neutral's offset and the contours stay. 0: in full, extrapolated, as "
+        "in the paper.",
+    )
 
     def at(self, fps: float) -> dict[str, float | int]:
-        """Arguments of the integration of a take: `seam_mm`, `detail_mm`, `smooth_frames`."""
+        """Arguments of the integration: `seam_mm`, `detail_mm`, `smooth_frames`, `fade_power`."""
         frames = round(self.smooth_s * fps)
         return {
             "seam_mm": self.seam_mm,
             "detail_mm": self.detail_mm,
             "smooth_frames": frames if frames > 1 else 0,
+            "fade_power": self.fade_power,
         }
 
 
@@ -105,17 +117,17 @@ class ImageAgreementConfig(StageConfig):
         le=100.0,
         description="A contour point at this distance from the mesh's contour counts half (mm).",
     )
-    closed_gap_iod: float = Field(
-        0.012,
+    coherence_s: float = Field(
+        0.2,
         ge=0.0,
-        le=0.2,
-        description="The lips touch where the inner contour in the image is lower than this, per "
-        "distance between the outer corners of the eyes (about 1 mm).",
+        le=1.0,
+        description="What contours and contact do to the lips resembles what they do to frames this near "
+        "(seconds), and the nearer the more: the lips do not tremble, and nothing comes late. 0: each "
+        "frame by itself.",
     )
     contact: bool = Field(
         True,
-        description="Lips that touch in the image touch in the mesh (by `contour_weight`), and lips never "
-        "pass through each other.",
+        description="Lips never pass through each other.",
     )
     folded_deg: float = Field(
         120.0,
@@ -132,10 +144,18 @@ class ImageAgreementConfig(StageConfig):
         "(degrees): a crease of its own.",
     )
 
-    @property
-    def reach_frames(self) -> int:
+    def at(self, fps: float) -> dict[str, Any]:
+        """Plain values of `correction.image_agreement.ImageAgreementSettings` for a take of `fps` a second."""
+        return {
+            **self.model_dump(exclude={"coherence_s"}),
+            "coherence_frames": round(self.coherence_s * fps),
+        }
+
+    def reach_frames(self, fps: float) -> int:
         """Frames to either side whose corrected meshes the result of a frame depends on."""
-        return math.ceil(3 * self.repose_frames) if self.repose else 0
+        repose = math.ceil(3 * self.repose_frames) if self.repose else 0
+        # A frame within the coherence depends on others in turn; twice as far off that is nothing.
+        return repose + math.ceil(_COHERENCE_REACH * round(self.coherence_s * fps))
 
 
 class CorrectionConfig(StageConfig):
@@ -152,8 +172,8 @@ class CorrectionConfig(StageConfig):
 
     def at(self, fps: float) -> dict[str, Any]:
         """Plain values of `correction.correct.CorrectionSettings` for a take of `fps` a second."""
-        return {**self.integration.at(fps), "image": self.image.model_dump()}
+        return {**self.integration.at(fps), "image": self.image.at(fps)}
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose features the result of a frame depends on."""
-        return self.image.reach_frames + int(self.integration.at(fps)["smooth_frames"])
+        return self.image.reach_frames(fps) + int(self.integration.at(fps)["smooth_frames"])

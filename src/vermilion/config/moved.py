@@ -16,16 +16,20 @@ MOVED = {
     "landmarks.key_frames.csv": "landmarks.key_frames.files",
     "detail.shading": "detail.relief",
     "tracking.identity.pictures": "tracking.identity.images",
-    "correction.image.closed": "correction.image.closed_gap_iod",
-    "correction.picture.closed": "correction.image.closed_gap_iod",
     "correction.picture": "correction.image",
 }
 
 _AS_DRAWN = "Contour labels count as drawn now; none is moved or left out."
+_TOUCH = (
+    "Lips meet where their contours do; what drew them together besides made the opening worse."
+)
 _FORMATS = "The formats are one list now, `apply.export.formats`, such as `[usd, obj]`."
 
 #: Keys that are gone -> the reason.
 REMOVED = {
+    "correction.image.closed": _TOUCH,
+    "correction.image.closed_gap_iod": _TOUCH,
+    "correction.picture.closed": _TOUCH,
     "contours.detector.label_tolerance": _AS_DRAWN,
     "contours.detector.label_reach": _AS_DRAWN,
     "apply.export.usd": _FORMATS,

@@ -22,7 +22,7 @@ from vermilion.geometry.sparse import CholeskyFactor
 
 _ROUNDS = 10
 #: Keeps the system definite where exact constraints repeat each other.
-_LEAST_COMPLIANCE = 1e-9
+LEAST_COMPLIANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,15 @@ class LinearConstraints:
     target_mm: np.ndarray
     compliance: np.ndarray
     one_sided: np.ndarray
+
+    @classmethod
+    def none(cls) -> LinearConstraints:
+        """No constraint."""
+        empty = np.zeros(0)
+        return cls(
+            np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)), np.zeros((0, 3)), empty, empty,
+            np.zeros(0, dtype=bool),
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.target_mm)
@@ -114,24 +123,31 @@ class ConstraintSolver:
 
     def response(self, of: LinearConstraints, to: LinearConstraints) -> np.ndarray:
         """(m, m'): what `of` measures when each force of `to` is one."""
-        inverse = self._shares(of) @ (self._shares(to) @ self._inverse).T
-        return inverse * (of.directions @ to.directions.T)
+        return self.response_of(self.answers(of), of, to)
 
-    def displacements_at(
-        self, vertices: np.ndarray, constraints: LinearConstraints, forces: np.ndarray
+    def answers(self, of: LinearConstraints) -> np.ndarray:
+        """(m, K + 1): how what `of` measures follows the named vertices' pushes, by size alone."""
+        return self._shares(of) @ self._inverse
+
+    def response_of(
+        self, answers: np.ndarray, of: LinearConstraints, to: LinearConstraints
     ) -> np.ndarray:
-        """Displacements (n, 3) mm of some of the named vertices (n,), by the forces (m,)."""
-        pushes = self._shares(constraints).T @ (forces[:, None] * constraints.directions)
+        """`response`, with the `answers` (m, K + 1) of `of` made before."""
+        return (self._shares(to) @ answers.T).T * (of.directions @ to.directions.T)
+
+    def pushes(self, constraints: LinearConstraints, forces: np.ndarray) -> np.ndarray:
+        """(K + 1, 3): pushes at the named vertices by the forces (m,) along constraints; the last one is of the others."""
+        return self._shares(constraints).T @ (forces[:, None] * constraints.directions)
+
+    def displacements_at(self, vertices: np.ndarray, pushes: np.ndarray) -> np.ndarray:
+        """Displacements (n, 3) mm of some of the named vertices (n,), by a frame's pushes (K + 1, 3)."""
         return self._inverse[self._place[vertices]] @ pushes
 
-    def displacements(
-        self, constraints: Sequence[LinearConstraints], forces: Sequence[np.ndarray]
-    ) -> np.ndarray:
-        """Displacements (F, N, 3) mm of the integrator's free vertices, by each frame's `forces` (m,)."""
-        right = np.zeros((len(self._integrator.free), 3, len(constraints)))
-        for f, (of_frame, strength) in enumerate(zip(constraints, forces, strict=True)):
-            pushes = self._shares(of_frame).T @ (strength[:, None] * of_frame.directions)
-            right[self._named_rows, :, f] = pushes[:-1]
+    def displacements(self, pushes: Sequence[np.ndarray]) -> np.ndarray:
+        """Displacements (F, N, 3) mm of the integrator's free vertices, by each frame's pushes (K + 1, 3)."""
+        right = np.zeros((len(self._integrator.free), 3, len(pushes)))
+        for f, of_frame in enumerate(pushes):
+            right[self._named_rows, :, f] = of_frame[:-1]
         return np.moveaxis(self._factor.solve(right), 2, 0)
 
     def _shares(self, constraints: LinearConstraints) -> sparse.csr_matrix:
@@ -146,7 +162,7 @@ def one_sided_forces(response: np.ndarray, constraints: LinearConstraints) -> np
         response: (m, m), what each constraint measures when the force of another is one.
         constraints: m.
     """
-    system = response + np.diag(constraints.compliance + _LEAST_COMPLIANCE)
+    system = response + np.diag(constraints.compliance + LEAST_COMPLIANCE)
     result, active = np.zeros(len(constraints)), np.ones(len(constraints), dtype=bool)
     for _ in range(_ROUNDS):
         result[:] = 0.0

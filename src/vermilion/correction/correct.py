@@ -31,12 +31,15 @@ class CorrectionSettings:
         seam_mm: width of the soft ring outside the mask.
         detail_mm: detail finer than this comes from layers, the rest from displacements; 0: layers alone.
         smooth_frames: frames to either side that the regressed layers are smoothed over; 0: none.
+        fade_power: outside the training's span what is regressed counts by this power of the span over the
+            frame's novelty; 0: it counts in full.
         image: agreement with the image; None: none, as in the paper.
     """
 
     seam_mm: float
     detail_mm: float
     smooth_frames: int
+    fade_power: float
     image: ImageAgreementSettings | None
 
     @classmethod
@@ -46,7 +49,7 @@ class CorrectionSettings:
 
     def as_in_the_paper(self) -> CorrectionSettings:
         """Without the image, which Lips16 leaves to future work, each frame by itself."""
-        return replace(self, smooth_frames=0, image=None)
+        return replace(self, smooth_frames=0, fade_power=0.0, image=None)
 
 
 def correct(model: LipModel, take: CoarseTake, settings: CorrectionSettings) -> np.ndarray:
@@ -126,10 +129,18 @@ class Corrector:
             features: (F, M), finite.
             frames: (F,) frame numbers, ascending.
         """
-        mixture = self.model.mixture(features, self.neutral_mm)
+        mixture = self._within_span(features) * self.model.mixture(features, self.neutral_mm)
         mixture = smoothed_over_time(mixture, frames, self.settings.smooth_frames)
         mixture = np.concatenate([mixture, np.ones((len(mixture), 1))], axis=1)
         return self.integrator.integrate_mixture(coarse_mm, mixture, self._basis, self._places)
+
+    def _within_span(self, features: np.ndarray) -> np.ndarray:
+        """(F, 1): how much of what is regressed counts; 1 in the training's span, beyond which it is extrapolated."""
+        limit = self.model.novelty_limit
+        if self.settings.fade_power == 0 or not np.isfinite(limit):
+            return np.ones((len(features), 1))
+        novelty = self.model.novelty(features, self.neutral_mm)[:, None]
+        return np.minimum(1.0, limit / np.maximum(novelty, 1e-9)) ** self.settings.fade_power
 
 
 def _agreement(

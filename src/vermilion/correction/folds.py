@@ -19,9 +19,10 @@ class LipFolds:
     """
 
     def __init__(self, face: FaceModel, folded_deg: float, crease_deg: float):
-        self._triangles = face.triangles
         one_lip = triangles_of_one_lip(lip_sides(face, with_inside=True), face.triangles)
-        self._pairs = adjacent_triangles(face.triangles, np.flatnonzero(one_lip))
+        pairs = adjacent_triangles(face.triangles, np.flatnonzero(one_lip))
+        self._ids, places = np.unique(pairs, return_inverse=True)
+        self._pairs, self._triangles = places.reshape(pairs.shape), face.triangles[self._ids]
         self._folded, self._crease = np.cos(np.radians((folded_deg, crease_deg)))
 
     def folded_triangles(self, corrected_mm: np.ndarray, base_mm: np.ndarray) -> np.ndarray:
@@ -34,7 +35,8 @@ class LipFolds:
             (normals[self._pairs[:, 0]] * normals[self._pairs[:, 1]]).sum(axis=1)
             for normals in (self._normals(corrected_mm), self._normals(base_mm))
         )
-        return np.unique(self._pairs[(now < self._folded) & (before >= self._crease)])
+        found = self._pairs[(now < self._folded) & (before >= self._crease)]
+        return self._ids[np.unique(found)]
 
     def _normals(self, vertices_mm: np.ndarray) -> np.ndarray:
         return normalised(triangle_cross(vertices_mm, self._triangles))

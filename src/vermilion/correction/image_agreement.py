@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vermilion.correction.coarse_take import CoarseTake
+from vermilion.correction.coherent_constraints import coherent_pushes, frame_correlation
 from vermilion.correction.constraints import ConstraintSolver, LinearConstraints
 from vermilion.correction.folds import LipFolds
 from vermilion.correction.image_contours import ImageContours
 from vermilion.correction.integration import LayerIntegrator
 from vermilion.correction.lip_constraints import (
+    SLACK_MM,
     LipSamples,
-    contact_constraints,
     contour_constraints,
     separation_constraints,
 )
@@ -38,6 +39,8 @@ _LEAST_KNOWN = 0.3
 #: Rounds of parting the lips, with how much of the contours' weight.
 _ROUNDS, _CONTOURS_COUNT = 8, (1.0, 0.1, 0.01)
 _MOST_CONSTRAINTS = 800
+#: How often parting and unfolding follow each other.
+_TURNS = 3
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,8 @@ class ImageAgreementSettings:
         bending_mm: over shorter lengths than this the lips bend as a plate, over longer ones they stretch as
             a membrane, where contours and contact move them; 0: a membrane alone.
         contour_robust_mm: a contour point this far off counts half.
-        closed_gap_iod: lips touch where the inner contour is lower than this, per inter-ocular distance.
-        contact: whether lips that touch in the image meet, and never pass through each other.
+        coherence_frames: frames to either side whose displacements resemble a frame's own; 0: none.
+        contact: whether lips never pass through each other.
         folded_deg: of `LipFolds`: what counts as a fold of the lips, which is taken out.
         crease_deg: of `LipFolds`: what is a crease of the base track.
     """
@@ -62,7 +65,7 @@ class ImageAgreementSettings:
     contour_weight: float
     bending_mm: float
     contour_robust_mm: float
-    closed_gap_iod: float
+    coherence_frames: int
     contact: bool
     folded_deg: float
     crease_deg: float
@@ -133,20 +136,22 @@ class ImageAgreement:
             rotation, translation_mm = self._reposed(
                 head_mm, take, image.camera, lines, seen, unit_px
             )
-        head_mm = np.array(head_mm)
-        found = [
-            self._constrained(
-                head_mm[f], rotation[f], translation_mm[f], image, f,
-                tuple(part[f] for part in lines), seen[f], float(unit_px[f]),
-            )
-            for f in frames
-        ]  # fmt: skip
-        if found:
-            constraints, forces = zip(*found, strict=True)
-            head_mm[:, self._free] += self._solver.displacements(constraints, forces)
         coarse_mm = head_from_world(take.coarse_mm, take.rotation, take.translation_mm)
-        for f in frames:
-            head_mm[f] = self._unfolder.unfold(head_mm[f], coarse_mm[f])
+        if seen and (self.settings.contour_weight > 0 or self.settings.contact):
+            on_contours = [
+                self._on_contours(
+                    head_mm[f], rotation[f], translation_mm[f], image, f,
+                    tuple(part[f] for part in lines), seen[f],
+                )
+                for f in frames
+            ]  # fmt: skip
+            head_mm = self._moved(head_mm, on_contours, take.frames_apart)
+        head_mm = self._unfolder.unfold_over_time(
+            head_mm, coarse_mm, take.frames_apart, self.settings.coherence_frames
+        )
+        if self.settings.contact:
+            for f in frames:
+                head_mm[f] = self._parted(head_mm[f], coarse_mm[f])
         return world_from_head(head_mm, rotation, translation_mm)
 
     def _reposed(self, head_mm, take, camera, lines, seen, unit_px):
@@ -167,38 +172,57 @@ class ImageAgreement:
         origin = apply_motion(take.translation_mm[:, None], pivot, motion)[:, 0]
         return rotation_matrix(motion[:, :3]) @ take.rotation, origin
 
-    def _constrained(
-        self, vertices, rotation, translation_mm, image, f, lines, seen, unit_px
-    ) -> tuple[LinearConstraints, np.ndarray]:
-        """Constraints of a frame and the forces along them."""
-        weight, n = self.settings.contour_weight, image.inner_px.shape[1]
-        place = rotation, translation_mm
-        robust_mm = self.settings.contour_robust_mm
+    def _on_contours(
+        self, vertices, rotation, translation_mm, image, f, lines, seen
+    ) -> LinearConstraints:
+        """What lays the lips of a frame on its contours; none where they do not count."""
+        weight, place = self.settings.contour_weight, (rotation, translation_mm)
 
-        def on_contours(samples: LipSamples, now: np.ndarray) -> LinearConstraints:
+        def constraints(samples: LipSamples, now: np.ndarray) -> LinearConstraints:
             return contour_constraints(
-                samples, vertices, *place, image.camera, lines, weight or 1.0, robust_mm, now
-            )
-
-        constraints = on_contours(seen, vertices)
-        # Which points form the inner contour, and which are far off: found again at about the result.
-        if weight > 0:
-            now = np.array(vertices)
-            forces = self._solver.forces(constraints)
-            now[self._lips] += self._solver.displacements_at(self._lips, constraints, forces)
-            constraints = on_contours(self._seen(now, *place, image, f), now)
-        else:
-            constraints = constraints[:0]
-        if not self.settings.contact:
-            return constraints, self._solver.forces(constraints)
-        if weight > 0:
-            view = vertices[self._eyes].mean(axis=0) @ rotation.T + translation_mm
-            view = (view - image.camera.centre_mm) @ rotation
-            constraints += contact_constraints(
-                self._samples, vertices, image.inner_px[f], lines[2][n:], unit_px,
-                view / np.linalg.norm(view), weight, self.settings.closed_gap_iod,
+                samples, vertices, *place, image.camera, lines, weight or 1.0,
+                self.settings.contour_robust_mm, now,
             )  # fmt: skip
-        return self._separated(vertices, constraints)
+
+        first = constraints(seen, vertices)
+        if weight == 0:
+            return first[:0]
+        # Which points form the inner contour, and which are far off: found again at about the result.
+        now, pushes = np.array(vertices), self._solver.pushes(first, self._solver.forces(first))
+        now[self._lips] += self._solver.displacements_at(self._lips, pushes)
+        return constraints(self._seen(now, *place, image, f), now)
+
+    def _parted(self, vertices: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+        """A head (V, 3) whose lips unfolding laid into each other: parted and unfolded in turn."""
+        nothing = LinearConstraints.none()
+        for _ in range(_TURNS):
+            if self._crossings.find(vertices).deepest_mm <= SLACK_MM:
+                break
+            vertices = np.array(vertices)
+            pushes = self._solver.pushes(*self._separated(vertices, nothing))
+            vertices[self._free] += self._solver.displacements([pushes])[0]
+            vertices = self._unfolder.unfold(vertices, coarse)
+        return vertices
+
+    def _moved(
+        self, head_mm: np.ndarray, on_contours: list[LinearConstraints], frames: np.ndarray
+    ) -> np.ndarray:
+        """Heads (F, V, 3) with the lips on their contours and out of each other, each frame with its neighbours."""
+        moved_mm, wanted = np.array(head_mm), list(on_contours)
+        through = range(len(head_mm) if self.settings.contact else 0)
+        for f in through:
+            found, forces = self._separated(head_mm[f], wanted[f])
+            wanted[f] += found[found.one_sided & (forces > 0)]
+        correlation = frame_correlation(frames, self.settings.coherence_frames)
+        pushes = coherent_pushes(self._solver, wanted, correlation)
+        moved_mm[:, self._free] += self._solver.displacements(pushes)
+        # What is left in the other lip then is put out in its frame alone, the contours as they lie by now.
+        for f in through:
+            rest = replace(on_contours[f], target_mm=np.zeros(len(on_contours[f])))
+            pushes[f] = self._solver.pushes(*self._separated(moved_mm[f], rest))
+        if len(through):
+            moved_mm[:, self._free] += self._solver.displacements(pushes)
+        return moved_mm
 
     def _seen(self, vertices, rotation, translation_mm, image, f) -> LipSamples:
         """Samples on the contours as they are seen: of the inner one, what hides the mouth now."""
@@ -222,7 +246,8 @@ class ImageAgreement:
             both = replace(constraints, compliance=constraints.compliance / counts)
             for _ in range(_ROUNDS):
                 forces = self._solver.forces(both)
-                now[ids] = vertices[ids] + self._solver.displacements_at(ids, both, forces)
+                pushes = self._solver.pushes(both, forces)
+                now[ids] = vertices[ids] + self._solver.displacements_at(ids, pushes)
                 through, deepest_mm = separation_constraints(self._crossings, vertices, now)
                 if deepest_mm < least:
                     least, best = deepest_mm, (both, forces)

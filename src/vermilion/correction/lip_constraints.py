@@ -1,4 +1,4 @@
-"""Constraints on the lips of one frame: on the found contours, touching, never one in the other."""
+"""Constraints on the lips of one frame: on the found contours, never one in the other."""
 
 from __future__ import annotations
 
@@ -92,48 +92,6 @@ def contour_constraints(
         1.0 / counts, np.zeros(len(off_mm), dtype=bool),
     )  # fmt: skip
     return made[known & np.isfinite(off_mm)]
-
-
-def contact_constraints(
-    samples: LipSamples,
-    vertices_mm: np.ndarray,
-    inner_px: np.ndarray,
-    known: np.ndarray,
-    unit_px: float,
-    view: np.ndarray,
-    weight: float,
-    closed_gap_iod: float,
-) -> LinearConstraints:
-    """Where the inner contour is closed in the image, its upper and lower samples meet.
-
-    Args:
-        vertices_mm: (V, 3) head frame.
-        inner_px: (n, 2) found inner ring, known (n,).
-        unit_px: inter-ocular distance.
-        view: (3,) unit direction of the view in the head frame: it and the vertical are held, along
-            the mouth the lips slide.
-        weight: of a millimetre of contour.
-        closed_gap_iod: height of the inner contour, under which it is closed, per inter-ocular distance.
-    """
-    n = len(inner_px)
-    upper = np.arange(1, n // 2)
-    lower = n - upper
-    apart = np.linalg.norm(inner_px[upper] - inner_px[lower], axis=1) / unit_px
-    touching = (apart < closed_gap_iod) & known[upper] & known[lower]
-    inner = len(samples.points) - n  # where the inner ring begins
-    upper, lower = inner + upper[touching], inner + lower[touching]
-    above, below = samples.points[upper], samples.points[lower]
-    vertices = np.concatenate([p.corners(samples.triangles) for p in (above, below)], axis=1)
-    coefficients = np.concatenate([above.barycentric, -below.barycentric], axis=1)
-    vertical = np.array([0.0, 1.0, 0.0]) - view[1] * view
-    axes = np.stack([view, vertical / np.linalg.norm(vertical)])
-    directions = np.repeat(axes, len(upper), axis=0)
-    vertices, coefficients = np.tile(vertices, (2, 1)), np.tile(coefficients, (2, 1))
-    compliance = 1.0 / (weight * np.tile(samples.length_mm[upper], 2))
-    made = LinearConstraints(vertices, coefficients, directions, np.zeros(len(vertices)), compliance,
-                np.zeros(len(vertices), dtype=bool))  # fmt: skip
-    made.target_mm[:] = -made.evaluate(vertices_mm)
-    return made
 
 
 def separation_constraints(
