@@ -90,13 +90,13 @@ def test_killed_run(finished, whole):
 
 
 def test_truncated_output(finished, whole, capsys):
-    layers = sorted(finished.results.glob("takes/s1/rom/correction/layers/*.npz"))[0]
-    os.truncate(layers, layers.stat().st_size // 2)
+    sums = finished.results / "evaluation/takes/s1/phone/sums.npz"
+    os.truncate(sums, sums.stat().st_size // 2)
     assert checksums.main([str(finished.results)]) == 1
     printed = capsys.readouterr().out
-    assert f"damaged: {layers}" in printed and "1 damaged file(s)" in printed
-    assert not layers.exists()
-    assert finished.would_run()["layers"] == 1
+    assert f"damaged: {sums}" in printed and "1 damaged file(s)" in printed
+    assert not sums.exists()
+    assert finished.would_run()["evaluate"] == 1
     finished.snakemake()
     checksums.main([str(finished.results)])
     assert "0 damaged file(s)" in capsys.readouterr().out

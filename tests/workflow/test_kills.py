@@ -11,7 +11,7 @@ from tests.workflow.disturbed_run import DisturbedRun, Results
 
 pytestmark = pytest.mark.slow
 
-SAMPLE = 5
+SAMPLE = 3
 ALL = int(os.environ.get("VERMILION_KILLS", "0"))
 SEED = int(os.environ.get("VERMILION_KILLS_SEED", "1"))
 
