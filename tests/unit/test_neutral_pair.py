@@ -193,16 +193,19 @@ def test_round_trip(pair, tmp_path):
     np.testing.assert_array_equal(read.features, pair.features)
 
 
-def test_outside_the_training_what_is_regressed_fades_and_inside_it_counts_in_full(model):
-    """Far off, the person's own bias stays, where the regressor alone would go on for ever."""
-    features = np.array(
-        [[0.1, 0.0, 0.2, 0.1], [30.0, 0.0, -20.0, 10.0], [300.0, 0.0, -200.0, 100.0]]
-    )
-    model = replace(model, novelty_limit=1.01 * model.novelty(features[:1], shape(1))[0])
+def test_outside_the_training_what_is_regressed_fades_to_its_mean_and_inside_it_counts_in_full(
+    model,
+):
+    features = np.array([[0.1, 0.0, 0.2, 0.1], [3.0, 0.0, -2.0, 1.0], [300.0, 0.0, -200.0, 100.0]])
+    novelty = model.novelty(features, shape(1))
+    model = replace(model, novelty_limit=1.01 * novelty[0])
+    mean, full = model.estimator.mean_mixture(), model.mixture(features, shape(1))
     settings = CorrectionSettings(16.0, 0.0, smooth_frames=0, fade_power=4.0, image=None)
     corrector = SimpleNamespace(model=model, neutral_mm=shape(1), settings=settings)
-    share = Corrector._within_span(corrector, features)[:, 0]
-    assert share[0] == 1.0
-    assert share[1] < 0.01 and share[2] < 0.001 * share[1]
+    faded = Corrector._within_span(corrector, features)
+    np.testing.assert_allclose(faded[0], full[0], rtol=1e-5, atol=1e-6)
+    shares = np.linalg.norm(faded - mean, axis=1) / np.linalg.norm(full - mean, axis=1)
+    np.testing.assert_allclose(shares[1:], (model.novelty_limit / novelty[1:]) ** 4, rtol=1e-3)
+    assert shares[2] < shares[1] < 1.0
     corrector.settings = settings.as_in_the_paper()
-    np.testing.assert_array_equal(Corrector._within_span(corrector, features), 1.0)
+    np.testing.assert_array_equal(Corrector._within_span(corrector, features), full)

@@ -65,9 +65,9 @@ class IntegrationConfig(StageConfig):
         4.0,
         ge=0.0,
         le=20.0,
-        description="Outside the training's span (`novelty` above its limit) what is regressed counts by this "
-        "power of limit over novelty; the neutral's offset and the contours stay. 0: in full, extrapolated, as "
-        "in the paper.",
+        description="Outside the training's span (`novelty` above its limit) what is regressed fades to the "
+        "training's mean: it counts by this power of limit over novelty. `training.reach` does so by each "
+        "feature's range, this by all features together. 0: no fade, as in the paper.",
     )
 
     def at(self, fps: float) -> dict[str, float | int]:

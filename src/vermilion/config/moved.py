@@ -29,7 +29,6 @@ _FORMATS = "The formats are one list now, `apply.export.formats`, such as `[usd,
 REMOVED = {
     "correction.image.closed": _TOUCH,
     "correction.image.closed_gap_iod": _TOUCH,
-    "correction.picture.closed": _TOUCH,
     "contours.detector.label_tolerance": _AS_DRAWN,
     "contours.detector.label_reach": _AS_DRAWN,
     "apply.export.usd": _FORMATS,

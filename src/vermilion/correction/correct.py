@@ -31,8 +31,8 @@ class CorrectionSettings:
         seam_mm: width of the soft ring outside the mask.
         detail_mm: detail finer than this comes from layers, the rest from displacements; 0: layers alone.
         smooth_frames: frames to either side that the regressed layers are smoothed over; 0: none.
-        fade_power: outside the training's span what is regressed counts by this power of the span over the
-            frame's novelty; 0: it counts in full.
+        fade_power: outside the training's span what is regressed fades to the training's mean, by this power
+            of the span over the frame's novelty; 0: it does not.
         image: agreement with the image; None: none, as in the paper.
     """
 
@@ -129,18 +129,21 @@ class Corrector:
             features: (F, M), finite.
             frames: (F,) frame numbers, ascending.
         """
-        mixture = self._within_span(features) * self.model.mixture(features, self.neutral_mm)
+        mixture = self._within_span(features)
         mixture = smoothed_over_time(mixture, frames, self.settings.smooth_frames)
         mixture = np.concatenate([mixture, np.ones((len(mixture), 1))], axis=1)
         return self.integrator.integrate_mixture(coarse_mm, mixture, self._basis, self._places)
 
     def _within_span(self, features: np.ndarray) -> np.ndarray:
-        """(F, 1): how much of what is regressed counts; 1 in the training's span, beyond which it is extrapolated."""
+        """The model's mixture (F, R) of features (F, M), faded to the training's mean outside the training's span."""
+        mixture = self.model.mixture(features, self.neutral_mm)
         limit = self.model.novelty_limit
         if self.settings.fade_power == 0 or not np.isfinite(limit):
-            return np.ones((len(features), 1))
+            return mixture
         novelty = self.model.novelty(features, self.neutral_mm)[:, None]
-        return np.minimum(1.0, limit / np.maximum(novelty, 1e-9)) ** self.settings.fade_power
+        counts = np.minimum(1.0, limit / np.maximum(novelty, 1e-9)) ** self.settings.fade_power
+        mean = self.model.estimator.mean_mixture()
+        return mean + counts * (mixture - mean)
 
 
 def _agreement(

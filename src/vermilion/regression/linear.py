@@ -190,6 +190,10 @@ class LinearOutputs:
         """Coefficients (F, R) of the basis for `features` (F, M), in its precision."""
         return (self.activations(features) @ self.coefficients_).astype(self.basis_.dtype)
 
+    def mean_mixture(self) -> np.ndarray:
+        """Coefficients (R,) of the basis for the training's mean, to which predictions fade."""
+        return (self.mean_activation_ @ self.coefficients_).astype(self.basis_.dtype)
+
     def predict(self, features: np.ndarray, person: int | None = None) -> np.ndarray:
         """Outputs (F, K) for `features` (F, M), in the precision of the weights; `person` as in `fit`."""
         return self.mixture(features) @ self.basis_ + self.bias_of(person)
