@@ -104,6 +104,6 @@ def test_frames_without_constraints_follow_their_neighbours():
     assert moved[8:24].min() > 0.8 * moved[8:24].max()
 
 
-@pytest.mark.parametrize(("fps", "frames"), [(10, 2), (30, 6), (60, 12)])
-def test_the_coherence_is_a_time(fps, frames):
+@pytest.mark.parametrize(("fps", "frames"), [(10, 2), (30, 6), (60, 12), (240, 12)])
+def test_the_coherence_is_a_time_of_at_most_twelve_frames(fps, frames):
     assert CorrectionConfig().image.at(fps)["coherence_frames"] == frames

@@ -10,7 +10,9 @@ from pydantic import Field
 from vermilion.config.base import StageConfig, section
 
 #: Frames to either side that count, per `coherence_s` in frames: one for the unfolding, the rest for the solve.
-_COHERENCE_REACH = 3.0
+_COHERENCE_REACH = 3
+#: Frames to either side at most: what the solve takes grows with their square, and so many still the noise.
+_MOST_COHERENT = 12
 
 
 class LayersConfig(StageConfig):
@@ -122,7 +124,7 @@ class ImageAgreementConfig(StageConfig):
         ge=0.0,
         le=1.0,
         description="What contours and contact do to the lips resembles what they do to frames this near "
-        "(seconds), and the nearer the more: the lips do not tremble, and nothing comes late. 0: each "
+        "(seconds; at most 12 frames), and the nearer the more: the lips do not tremble, and nothing comes late. 0: each "
         "frame by itself.",
     )
     contact: bool = Field(
@@ -148,14 +150,17 @@ class ImageAgreementConfig(StageConfig):
         """Plain values of `correction.image_agreement.ImageAgreementSettings` for a take of `fps` a second."""
         return {
             **self.model_dump(exclude={"coherence_s"}),
-            "coherence_frames": round(self.coherence_s * fps),
+            "coherence_frames": self._coherence_frames(fps),
         }
 
     def reach_frames(self, fps: float) -> int:
         """Frames to either side whose corrected meshes the result of a frame depends on."""
         repose = math.ceil(3 * self.repose_frames) if self.repose else 0
         # A frame within the coherence depends on others in turn; twice as far off that is nothing.
-        return repose + math.ceil(_COHERENCE_REACH * round(self.coherence_s * fps))
+        return repose + _COHERENCE_REACH * self._coherence_frames(fps)
+
+    def _coherence_frames(self, fps: float) -> int:
+        return min(round(self.coherence_s * fps), _MOST_COHERENT)
 
 
 class CorrectionConfig(StageConfig):
