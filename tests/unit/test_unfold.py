@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from vermilion.correction.folds import LipFolds
 from vermilion.correction.unfold import Unfolder
 from vermilion.geometry.mesh import adjacency
 
-from .test_image_contours import DEFAULTS, FACE
+from .test_image_contours import DEFAULTS, FACE, OFF, agreement, depth_in_other_lip
 from .test_surface_quality import folded_mesh, middle
 
 FOLDS = LipFolds(FACE, DEFAULTS.folded_deg, DEFAULTS.crease_deg)
@@ -95,3 +97,12 @@ def test_frames_out_of_reach_of_a_fold_stay_as_they_are():
     assert not np.array_equal(mended[1], meshes[1])
     across_a_cut = UNFOLDER.unfold_over_time(meshes, base, np.r_[0, 1000 + np.arange(8)], 4)
     assert np.array_equal(across_a_cut[1:], meshes[1:])
+
+
+def test_lips_that_unfolding_laid_into_each_other_are_parted_without_a_new_fold():
+    through, base = lip_patch.vertices_at(-3.0, 0.0), lip_patch.vertices_at(0.6, 0.0)
+    assert depth_in_other_lip(through) > 0.3
+    parted = agreement(replace(OFF, contact=True))._parted(through, base)
+    assert depth_in_other_lip(parted) <= 0.01
+    assert folded(parted, base) == 0
+    assert agreement(replace(OFF, contact=True))._parted(base, base) is base

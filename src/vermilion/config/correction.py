@@ -124,8 +124,8 @@ class ImageAgreementConfig(StageConfig):
         ge=0.0,
         le=1.0,
         description="What contours and contact do to the lips resembles what they do to frames this near "
-        "(seconds; at most 12 frames), and the nearer the more: the lips do not tremble, and nothing comes late. 0: each "
-        "frame by itself.",
+        "(seconds; at most 12 frames), and the nearer the more: the lips do not tremble, and nothing "
+        "comes late. 0: each frame by itself.",
     )
     contact: bool = Field(
         True,

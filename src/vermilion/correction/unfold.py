@@ -1,10 +1,10 @@
 """Folds of the lips taken out: where a layer turned triangles over, the base track's surface is carried along.
 
 Layers of slivers at the corners of the mouth mean little, and contours are not seen there. A fold is a
-displacement that changes too quickly: round it, the base track's own surface, which does not fold there, is laid
-on the corrected surface rigidly, and what is left of the displacement is spread evenly from the surroundings.
-How far round differs from frame to frame. So what was made anew in a frame is made anew in its neighbours as
-well, the less the further off they are, and the lips do not tremble.
+displacement that changes too quickly: round it, the mesh gets the differences along edges of the base track's
+own surface, which does not fold there, turned as the mesh around is. How far round differs from frame to frame.
+So what was made anew in a frame is made anew in its neighbours as well, the less the further off they are, and
+the lips do not tremble.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from vermilion.geometry.mesh import adjacency
 
 #: Rings of vertices round a fold that are made anew, more each round until nothing folds.
 _RINGS = (1, 2, 3, 4, 6, 8)
-_LEAST_AROUND = 4
 #: Rings of vertices round what is made anew that say how it is turned, and how often their say is spread.
 _AROUND, _SPREADS = 4, 30
+#: A share this small is none: keeps what divides by shares and their rests finite.
 _LEAST_SHARE = 1e-4
 
 
